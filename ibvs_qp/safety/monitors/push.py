@@ -19,9 +19,13 @@ UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 WIND_SIGMAS = 6.0
 #: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N.
 MOST_WIND = 10.0
-#: A sensor that measures this fraction of its reference, and this push at least, is not dead [-, N]: the wind along the
-#: normal explains up to five standard deviations of the strongest gusts flown, 3 N [N]. Two false alarms had 12 N.
-FOLLOWED, LEAST_FOLLOWED, MOST_NORMAL_WIND = 0.5, 1.0, 15.0
+#: A sensor that measures this fraction of its reference, and this push at least, is not dead [-, N].
+FOLLOWED, LEAST_FOLLOWED = 0.5, 1.0
+#: Then the difference is the wind along the normal, which explains so many deviations of that along the wall, and this
+#: force at least [N]. False alarms had 12 N in gusts of 3 N rms and 17 N in gusts of 4 N rms.
+NORMAL_WIND = 15.0
+#: It is remembered for this long [s], because a gust takes the tip off the wall.
+WIND_MEMORY_S = 5.0
 #: Its measured push is an average over this time [s]: a gust lifts the tip off the wall for less.
 FOLLOWED_TIME_S = 0.3
 #: A push may follow its reference down for this long [s]: the tip leaves the wall after a touch ramp's time.
@@ -35,6 +39,7 @@ class PushMonitor:
     the rotors saturate, 30 N for 5 N. Thrust against acceleration measures the push without it. A gust changes that
     figure too, so the sensor must disagree widely, and by more than the gusts along the wall explain. A dead sensor
     does not follow the reference; one that does may differ by a gust along the normal, which nothing else measures.
+    That gust goes on when it takes the tip off the wall.
     """
 
     def __init__(self, settings: SafetySettings) -> None:
@@ -47,7 +52,7 @@ class PushMonitor:
         self._high.reset()
         self._unfelt.reset()
         self._reference, self._since = 0.0, 0.0
-        self._mean, self._time = 0.0, 0.0
+        self._mean, self._wind, self._time = 0.0, 0.0, 0.0
 
     def update(self, tick: Tick, response: Response, time_s: float) -> None:
         """Add the faults of the push."""
@@ -58,18 +63,22 @@ class PushMonitor:
             tick.faults[Fault.PUSH_HIGH] = f"{push:.1f} N, bound {bound:.1f} N"
         least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
-        wind = min(WIND_SIGMAS * response.wind_spread, MOST_WIND)
-        if self._average(push, time_s) > max(FOLLOWED * reference, LEAST_FOLLOWED):
-            wind = MOST_NORMAL_WIND
+        spread = WIND_SIGMAS * response.wind_spread
+        followed, normal_wind = self._normal_wind(inertial - push, push, reference, time_s)
+        wind = max(spread, NORMAL_WIND) if followed else max(min(spread, MOST_WIND), normal_wind)
         windy = inertial - push <= wind
         if self._unfelt.update(unfelt and not windy, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"
 
-    def _average(self, push: float, time_s: float) -> float:
-        """Measured push, low-passed [N]."""
-        self._mean += (1.0 - math.exp((self._time - time_s) / FOLLOWED_TIME_S)) * (push - self._mean)
-        self._time = time_s
-        return self._mean
+    def _normal_wind(self, difference: float, push: float, reference: float, time_s: float) -> tuple[bool, float]:
+        """Whether the sensor follows the reference, and the difference while it did, low-passed [N]."""
+        passed, self._time = time_s - self._time, time_s
+        self._mean += (1.0 - math.exp(-passed / FOLLOWED_TIME_S)) * (push - self._mean)
+        followed = self._mean > max(FOLLOWED * reference, LEAST_FOLLOWED)
+        target, within = (difference, FOLLOWED_TIME_S) if followed else (0.0, WIND_MEMORY_S)
+        self._wind += (1.0 - math.exp(-passed / within)) * (target - self._wind)
+        self._wind = min(max(self._wind, 0.0), NORMAL_WIND)
+        return followed, self._wind
 
     def _recent(self, reference: float, time_s: float) -> float:
         """Largest reference while the push may still follow it [N]."""

@@ -144,6 +144,19 @@ def test_a_sensor_that_dies_no_longer_follows() -> None:
     assert 0.2 < found[Fault.PUSH_UNFELT] < 0.4
 
 
+@pytest.mark.parametrize(("pressed", "finds"), [(11.5, False), (20.0, True)])
+def test_a_gust_that_takes_the_tip_off_the_wall_is_no_failed_sensor(pressed: float, finds: bool) -> None:
+    """The force of the gust was known while the sensor followed; a dead sensor presses harder."""
+    response = StubResponse(inertial_push=18.0, wind_spread=3.5)
+
+    def blown_off(number: int) -> dict[str, Any]:
+        off = number > BEGIN + 400
+        response.inertial_push = pressed if off else 18.0
+        return {"contact": CONTACT._replace(push=0.0 if off else 5.0)}
+
+    assert (Fault.PUSH_UNFELT in first_found(blown_off, response)) is finds
+
+
 def test_far_from_the_wall_wind_is_no_push() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},
