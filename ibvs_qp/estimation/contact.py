@@ -16,6 +16,7 @@ from ibvs_qp.estimation.push import FIRST_PUSH_VARIANCE, PushFilter
 from ibvs_qp.estimation.stamps import sample_interval
 from ibvs_qp.estimation.stiffness import stiffness
 from ibvs_qp.estimation.touch import TouchDetector, touch_threshold
+from ibvs_qp.estimation.touch_compliance import MeasuredDistance, touch_compliance
 from ibvs_qp.estimation.wall_distance import Plane, Tick, WallDistance
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
@@ -79,6 +80,8 @@ def contact_state(
     blind = both(interval > 0.0, touch.pressed, wall.known, wall.since_plane > BLIND_S)
     wall.touch(either(blind, another), both(another, no(blind)))
     touch.update(push.push, wall.distance)
+    seen = MeasuredDistance(wall.accepted, wall.measured, wall.distance, wall.distance_variance, wall.set_anew)
+    softest = config.brush.stiffness_min_n_m
     slope = stiffness(
         signals,
         settings,
@@ -91,12 +94,9 @@ def contact_state(
         variance=wall.variance,
         touching=touch.in_contact,
         felt=tick.force_known,
-        seen=wall.accepted,
-        measured_distance=wall.measured,
-        distance=wall.distance,
-        distance_variance=wall.distance_variance,
-        set_anew=either(wall.set_anew, blind, another),
-        softest_n_m=config.brush.stiffness_min_n_m,
+        by_planes=touch_compliance(
+            signals, estimation, seen, dt=tick.dt, push=push.push, touching=touch.in_contact, softest_n_m=softest
+        ),
     )
     wall.store(both(touch.in_contact, wall.distance <= settings.contact_distance_m))
     return {

@@ -86,7 +86,7 @@ class PushDisturbance:
 
     def __init__(self, signals: Signals, config: ControllerConfig, along: Normal) -> None:
         mass, damping, delay = config.vehicle.mass_kg, config.brush.damping_n_s_m, config.brush.force_delay_s
-        # Without an accelerometer the spring alone tells the rate, right or wrong.
+        # Without an accelerometer the rate comes from the model of the spring alone.
         trusted = either(along.stiffness_known, no(along.felt))
         late = where(trusted, delay * along.stiffness, 0.0)
         past = ca.vertcat(1.0, damping - late, 0.0, 0.0)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings
-from ibvs_qp.config.contact_estimation import ContactEstimationSettings
-from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.estimation.touch_compliance import STIFF_SIDE, Compliance
+from ibvs_qp.symbolic.logic import both, either, where
 from ibvs_qp.symbolic.signals import Signals
 
 #: Push and penetration count above this frequency [rad/s]: below, the twice integrated accelerometer drifts.
@@ -18,9 +18,6 @@ BAND = 8.0
 COMPLIANCE_STD, LEAST_STD = 5e-4, 1e-4
 #: Both start anew where the push is less [N]: a tip that leaves the wall moves on without it.
 PRESSED_N = 0.5
-#: The result is on the stiff side by so many standard deviations [-]: a loop that believes in less than a third of the
-#: true stiffness is unstable.
-STIFF_SIDE = 0.5
 #: Swings of the push count for this long [s]: another part of the wall may be softer.
 MEMORY_S = 60.0
 #: A swing of a touch reaches this [N].
@@ -32,14 +29,6 @@ MEAN = 1.0
 NOISE_SIGMAS = 3.0
 #: The stiffness is measured once the compliance is known to this part.
 KNOWN_PART = 0.5
-#: A touch begins to count at this push [N]: less may be a sensor that drifted, before the wall.
-BEGIN_N = 1.0
-#: Planes count for this long from then on [s], and so many are needed.
-TOUCH_S, LEAST_PLANES = 3.0, 30
-#: Their scatter is at most this many times that of the depth camera [-]: a plane of another surface spoils the touch.
-MOST_SCATTER = 1.8
-#: And their compliance is at most this many times that of the softest brush [-]: the touch of 1 kN/m errs by a half.
-MOST_COMPLIANCE = 2.0
 
 
 class Stiffness(NamedTuple):
@@ -62,12 +51,7 @@ def stiffness(
     variance: ca.SX,
     touching: ca.SX,
     felt: ca.SX,
-    seen: ca.SX,
-    measured_distance: ca.SX,
-    distance: ca.SX,
-    distance_variance: ca.SX,
-    set_anew: ca.SX,
-    softest_n_m: float,
+    by_planes: Compliance,
 ) -> Stiffness:
     r"""Compliance c = 1/k by Bayesian least squares of penetration on push, both in one band.
 
@@ -77,8 +61,8 @@ def stiffness(
 
     The distance filter holds a tip in contact at the wall, so the penetration is that of the accelerometer alone; r is
     its variance by the accelerometer's noise. Only swings of the push beyond its own noise count. Calm air has none,
-    and a slow touch is lost in the accelerometer's drift: the compliance by the planes of the last touch (`_planes`) is
-    a second measurement.
+    and a slow touch is lost in the accelerometer's drift: the compliance by the planes of the last touch is a second
+    measurement.
 
     Args:
         signals: Registry.
@@ -92,12 +76,7 @@ def stiffness(
         variance: Of one sample of the acceleration [m^2/s^4].
         touching: Whether the tip touches.
         felt: Whether there is an accelerometer.
-        seen: Whether a plane was accepted in this tick.
-        measured_distance: Of the tip, by that plane alone [m].
-        distance: Of the tip by the distance filter [m].
-        distance_variance: Of that distance [m^2].
-        set_anew: Whether that distance was set in this tick, instead of corrected.
-        softest_n_m: Stiffness of the softest brush [N/m]: more penetration is another surface's plane.
+        by_planes: Compliance by the planes of the last touch.
     """
     own = settings.estimation
     names = ("speed", "penetration", "lagged", "push_change", "push_twice", "push_band", "band", "push", "lever")
@@ -132,10 +111,7 @@ def stiffness(
     fade = ca.exp(-where(swings, dt, 0.0) / MEMORY_S)
     weight = signals.remember("stiffness.weight", fade * weight + counts * push_band**2)
     product = signals.remember("stiffness.product", fade * product + counts * push_band * band)
-    by_planes, seen_compliance = _planes(
-        signals, own, dt, push, touching, seen, measured_distance, distance, distance_variance, set_anew, softest_n_m
-    )
-    weight, product = weight + by_planes, product + by_planes * seen_compliance
+    weight, product = weight + by_planes.weight, product + by_planes.weight * by_planes.value
     prior = 1.0 / COMPLIANCE_STD**2
     compliance = (product + prior / own.assumed_stiffness_n_m) / (weight + prior)
     deviation = 1.0 / ca.sqrt(weight + prior)
@@ -146,59 +122,3 @@ def stiffness(
     old = signals.state("stiffness.value", start=own.assumed_stiffness_n_m)
     value = signals.remember("stiffness.value", where(touching, 1.0 / compliance, old))
     return Stiffness(value, signals.remember("stiffness.known", known))
-
-
-def _planes(
-    signals: Signals,
-    own: ContactEstimationSettings,
-    dt: ca.SX,
-    push: ca.SX,
-    touching: ca.SX,
-    seen: ca.SX,
-    measured_distance: ca.SX,
-    distance: ca.SX,
-    distance_variance: ca.SX,
-    set_anew: ca.SX,
-    softest_n_m: float,
-) -> tuple[ca.SX, ca.SX]:
-    r"""Weight [N^2/m^2] and compliance [m/N] by the planes of the last whole touch; weight zero before one.
-
-    .. math::
-        d_0 - d_i = c\,(f_i - f_0) + b + e_i, \quad b \sim \mathcal N(0, P), \quad e_i \sim \mathcal N(0, \sigma^2)
-
-    d_0 and f_0 are the filtered distance and the push at the touch, d_i and f_i those of a plane. The error b of d_0
-    has the variance P of the distance filter, at least that of one plane, and is integrated out: many planes do not
-    replace a better d_0. The compliance lies on the stiff side by `STIFF_SIDE` deviations and is at least the assumed
-    one. A touch does not count if it ends early, its distance is set anew, its planes scatter, or it seems far softer
-    than the softest brush.
-    """
-    names = ("time", "distance", "push", "error", "count", "rise", "depth", "rise_2", "product", "depth_2")
-    time, first_distance, first_push, error, *sums = (signals.state(f"touch_planes.{name}") for name in names)
-    begins = both(touching, time <= 0.0, push > BEGIN_N)
-    first_distance, first_push = where(begins, distance, first_distance), where(begins, push, first_push)
-    variance = own.distance_std_m**2
-    error = where(begins, ca.fmax(distance_variance, variance) / variance, error)
-    rise, depth = push - first_push, first_distance - measured_distance
-    counts = both(touching, seen, time > 0.0, time < TOUCH_S, rise > PRESSED_N)
-    steps = 1.0, rise, depth, rise**2, rise * depth, depth**2
-    sums = [where(begins, 0.0, total) + where(counts, step, 0.0) for total, step in zip(sums, steps, strict=True)]
-    spoilt = both(set_anew, time > 0.0)
-    later = where(either(begins, time > 0.0), where(spoilt, 2.0 * TOUCH_S, time + dt), 0.0)
-    later = where(touching, later, 0.0)
-    for name, value in zip(names, (later, first_distance, first_push, error, *sums), strict=True):
-        signals.remember(f"touch_planes.{name}", value)
-
-    count, rise, depth, rise_2, product, depth_2 = sums
-    share = error / (1.0 + error * count)
-    weight = (rise_2 - share * rise**2) / variance
-    compliance = (product - share * rise * depth) / variance / ca.fmax(weight, 1.0)
-    compliance = ca.fmax(compliance - STIFF_SIDE / ca.sqrt(ca.fmax(weight, 1.0)), 1.0 / own.assumed_stiffness_n_m)
-    mean = 1.0 / ca.fmax(count, 1.0)
-    across = product - mean * rise * depth
-    scatter = depth_2 - mean * depth**2 - across**2 / ca.fmax(rise_2 - mean * rise**2, 1e-6)
-    whole = both(touching, time < TOUCH_S, later >= TOUCH_S, no(spoilt), count >= LEAST_PLANES)
-    valid = both(whole, scatter * mean < MOST_SCATTER**2 * variance, compliance < MOST_COMPLIANCE / softest_n_m)
-    weight = where(valid, weight, signals.state("touch_planes.weight"))
-    compliance = where(valid, compliance, signals.state("touch_planes.compliance"))
-    signals.remember("touch_planes.weight", weight)
-    return weight, signals.remember("touch_planes.compliance", compliance)

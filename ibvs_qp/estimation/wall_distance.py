@@ -77,7 +77,7 @@ class WallDistance:
         anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
         measured: Distance of the tip by this plane alone [m].
-        set_anew: Whether the distance was set to this plane's.
+        set_anew: Whether the distance was set in this tick, instead of corrected.
         since_plane: Time since the capture of the last accepted plane [s].
         rate_noise: Standard deviation of the rate [m/s].
         variance: Of one sample of the acceleration along the normal [m^2/s^4].
@@ -138,8 +138,7 @@ class WallDistance:
         corrected, restart = self._correct_distance(both(trusted, covered), plane.age, distance, past, tip_stationary)
         kalman.set_entry(first, DISTANCE, FIRST_DISTANCE_STD)
         kalman.set_entry(both(first, self._gap), SPEED, GAP_SPEED_STD)
-        anew = either(first, restart)
-        self.set_anew = anew
+        self.set_anew = anew = either(first, restart)
         self._set(anew, DISTANCE, raw)
         self.offset, self.anew = where(anew, 0.0, self.offset), either(self.anew, anew)
         self.accepted = either(first, corrected)
@@ -240,6 +239,7 @@ class WallDistance:
             happens: Whether it rests there.
             another: Whether the planes are right, and of another surface: the next ones count from the felt one.
         """
+        self.set_anew = either(self.set_anew, happens)
         self.offset = self.offset + where(both(happens, another), self._state[DISTANCE], 0.0)
         self._kalman.set_entry(happens, DISTANCE, TOUCH_STD)
         self._kalman.set_entry(happens, SPEED, self._settings.stationary_speed_std_m_s)

@@ -9,12 +9,12 @@ from symbolic_block import Block
 
 from ibvs_qp.config import ContactSettings
 from ibvs_qp.estimation.stiffness import stiffness
+from ibvs_qp.estimation.touch_compliance import Compliance
 
 SETTINGS = ContactSettings()
 ASSUMED = SETTINGS.estimation.assumed_stiffness_n_m
 MASS, DAMPING, TICK, LAG = 6.0, 30.0, 0.004, 0.02
 NAMES = ("push", "push_noise", "acceleration", "lever_speed", "speed", "variance", "touching", "felt")
-NAMES += ("seen", "measured_distance", "distance", "distance_variance", "set_anew")
 
 
 def estimator() -> Block:
@@ -24,7 +24,7 @@ def estimator() -> Block:
                 signals,
                 SETTINGS,
                 dt=signals.input("dt"),
-                softest_n_m=1000.0,
+                by_planes=Compliance(ca.SX(0.0), ca.SX(0.0)),
                 **{name: signals.input(name) for name in NAMES},
             )
         )
