@@ -191,7 +191,7 @@ def _starts(plan: SearchPlan) -> list[Values]:
     shipped = plan.subject.values
     known = [shipped]
     if plan.law != RIVAL:
-        known += [Subject(plan.other).values, shipped | BY_HAND]
+        known += [shipped | Subject(plan.other).values, shipped | BY_HAND]
     return [{name: float(np.clip(each[name], *span)) for name, span in plan.subject.spans.items()} for each in known]
 
 

@@ -42,6 +42,8 @@ GAIN_RANGES = {
     "force_kfp": (0.0, 1.0),
     "push_filter_s": (0.0, 0.03),
 }
+#: The same of the one weight of the QP that acts without an active limit: it spreads a change of thrust over ticks.
+SMOOTHNESS = {"smoothness": (1e-3, 1.0)}
 #: The same of the rival's weights: up to a decade to both sides of the first ones, which were set by hand.
 WEIGHT_RANGES = {
     "line": (4e3, 4e5),
@@ -88,8 +90,12 @@ class Subject:
     @property
     def values(self) -> Values:
         """The present values of what is searched."""
-        source = self.weights if self.rival else self.config.controller.gains
-        return {name: getattr(source, name) for name in self.spans}
+        if self.rival:
+            return {name: getattr(self.weights, name) for name in self.spans}
+        controller = self.config.controller
+        return {
+            name: getattr(controller.weights if name in SMOOTHNESS else controller.gains, name) for name in self.spans
+        }
 
     @property
     def spans(self) -> Spans:
@@ -98,14 +104,21 @@ class Subject:
             return WEIGHT_RANGES
         mass = min(1.0, gain_factors(self.config.controller.vehicle)[0])
         impedance = {name: GAIN_RANGES[name] for name in ("force_ksp", "force_ksd")}
-        return GAIN_RANGES | {name: (mass * low, high) for name, (low, high) in impedance.items()}
+        scaled = {name: (mass * low, high) for name, (low, high) in impedance.items()}
+        return GAIN_RANGES | scaled | (SMOOTHNESS if self.config.law == "qp" else {})
 
     def having(self, values: Values) -> Subject:
         """The same with other values."""
         if self.rival:
             return dataclasses.replace(self, weights=dataclasses.replace(self.weights, **values))
-        gains = dataclasses.replace(self.config.controller.gains, **values)
-        controller = dataclasses.replace(self.config.controller, gains=gains)
+        of_weights = {name: value for name, value in values.items() if name in SMOOTHNESS}
+        of_gains = {name: value for name, value in values.items() if name not in SMOOTHNESS}
+        controller = self.config.controller
+        controller = dataclasses.replace(
+            controller,
+            gains=dataclasses.replace(controller.gains, **of_gains),
+            weights=dataclasses.replace(controller.weights, **of_weights),
+        )
         return dataclasses.replace(self, config=dataclasses.replace(self.config, controller=controller))
 
     def fragility(self) -> float:

@@ -93,7 +93,7 @@ def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
     trials = searched(80, "a.log")
     gains, shipped = trials[0]
     assert gains == Subject(ibvs_qp.preset("qp")).values and len(trials) == 80
-    assert trials[1][0] == Subject(ibvs_qp.preset("paper")).values
+    assert trials[1][0] == gains | Subject(ibvs_qp.preset("paper")).values
     assert trials[2][0] == gains | BY_HAND
     best = ranked({number: each for number, (_, each) in trials.items()}, shipped)
     assert best and gain_over(trials[best[0]][1], shipped) < -0.3
