@@ -12,7 +12,6 @@ from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.line_tracking import LINES, SLOTS, LineTracks
 from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.estimation.tracked_line import TrackedLine
-from ibvs_qp.estimation.vibration import VibrationNoise
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
 from ibvs_qp.frames import GRAVITY, add_scaled, cross, dot
 from ibvs_qp.measurement import FeatureFrame, LineFeature
@@ -66,15 +65,12 @@ class WallMotion:
         self._filter = DelayedKalman(chain, noise, deviation, tick_s, config.gate_sigmas)
         self._velocity_floor = config.velocity_std_m_s**2 * np.eye(2)
         self._tracks = LineTracks(self._filter, config)
-        self._vibration = VibrationNoise(config.vibration_time_s), VibrationNoise(config.vibration_time_s)
         self.reset()
 
     def reset(self) -> None:
         """Return to the state before the first frame."""
         self._filter.reset()
         self._tracks.reset()
-        for noise in self._vibration:
-            noise.reset()
         self.state: list[float] = self._filter.state.tolist()
         self.velocity_age_s, self.refused_s = math.inf, 0.0
         self._refused_stamp = -1
@@ -106,9 +102,24 @@ class WallMotion:
             self._filter.set_entry(entry, self.state[entry], GAP_VELOCITY_STD)
 
     def predict(
-        self, stamp_ns: int, axes: WallAxes, specific_force: Sequence[float], omega: Sequence[float], dt: float
+        self,
+        stamp_ns: int,
+        axes: WallAxes,
+        specific_force: Sequence[float],
+        omega: Sequence[float],
+        dt: float,
+        density: float = 0.0,
     ) -> None:
-        """Integrate accelerometer [m/s^2] and gyro [rad/s] over dt [s]; the tip moves with the body's rotation, too."""
+        """Integrate specific force and gyro over a tick; the tip moves with the body's rotation, too.
+
+        Args:
+            stamp_ns: Time of the tick.
+            axes: Axes of the wall in B.
+            specific_force: In B [m/s^2], (3,).
+            omega: Angular velocity in B [rad/s], (3,).
+            dt: Time since the last tick [s].
+            density: Noise of a component of the force [m^2/s^3], at least that of the settings.
+        """
         if 0 <= self._stamp < stamp_ns - GAP_NS:
             self.doubt()
             self._gap_end = stamp_ns
@@ -120,9 +131,8 @@ class WallMotion:
         along = dot(axes.right, acceleration), dot(axes.down, acceleration)
         state[0] += dt * (along[0] - bias_right)
         state[1] += dt * (along[1] - bias_down)
-        for entry, (noise, measured) in enumerate(zip(self._vibration, along, strict=True)):
-            noise.add(measured, dt)
-            self._filter.noise[entry, entry] = noise.density(self._config.acceleration_noise, dt)
+        for entry in range(VELOCITY.start, VELOCITY.stop):
+            self._filter.noise[entry, entry] = max(self._config.acceleration_noise**2, density)
         state[4] += right
         state[5] += down
         self._tracks.advance(stamp_ns, state, right, down)

@@ -229,6 +229,11 @@ class Setpoints:
         return self.step.outputs["modelled_force"].tolist()
 
     @property
+    def explained_force(self) -> list[float]:
+        """Specific force by the motors' model and the measured contact at the last step [m/s^2], (3,)."""
+        return self.step.outputs["explained_force"].tolist()
+
+    @property
     def motor_thrusts(self) -> np.ndarray:
         """Thrusts behind the motors' lag and the filter of `missing_thrust` [N], (n,): a view."""
         return self.step.outputs["motor_thrusts"]

@@ -21,6 +21,7 @@ from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.plane_acceleration import PlaneAcceleration
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
@@ -123,6 +124,7 @@ class Pilot:
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
+        self._plane_acceleration = PlaneAcceleration(self.config.estimation.vibration_time_s, settings.compiled)
         self._history = AttitudeHistory(self.motion.ticks)
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
@@ -152,7 +154,15 @@ class Pilot:
         self._gate.reset()
         self._inertial.reset(self._gate.last)
         sensing = (self.self_check, self.tare, self._history, self._camera)
-        flying = (self.contact, self.motion, self.rotor_loss, self.assurance, self.painter, self.controller)
+        flying = (
+            self.contact,
+            self.motion,
+            self._plane_acceleration,
+            self.rotor_loss,
+            self.assurance,
+            self.painter,
+            self.controller,
+        )
         for part in (*sensing, *flying, self.push_report):
             part.reset()
         self._first = self._stamp = self._imu_stamp = -1
@@ -280,7 +290,9 @@ class Pilot:
             self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
         self._check_axes(frame, contact, dt)
         axes = WallAxes.of(contact.normal, down)
-        self.motion.predict(stamp, axes, force, rate, dt)
+        plane = self._plane_acceleration
+        plane.update(dt, force, self.setpoints.explained_force, contact.normal)
+        self.motion.predict(stamp, axes, plane.force, rate, dt, plane.density)
         self._history.remember(attitude, rate, dt)
         if features is not None:
             self._correct_motion(features, contact)

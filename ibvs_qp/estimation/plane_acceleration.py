@@ -1,0 +1,117 @@
+"""Specific force for the motion in the wall plane: of the motors' model in calm air, of the accelerometer in gusts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+
+from ibvs_qp.estimation.push_disturbance import SLOW_CHANGE, filter_gain, gust_weight
+from ibvs_qp.symbolic.logic import where
+from ibvs_qp.symbolic.signals import Signals
+from ibvs_qp.symbolic.step_function import StepFunction
+
+#: Band of the accelerometer's broadband noise [rad/s]: above the gusts, below the lines of the rotors, which integrate
+#: to nothing.
+NOISE_LOW, NOISE_HIGH = 20.0, 60.0
+#: Power of white noise of unit density [1/s] behind two poles at `NOISE_HIGH` and one zero and pole at `NOISE_LOW`.
+NOISE_POWER = NOISE_HIGH**3 / (4.0 * (NOISE_HIGH + NOISE_LOW) ** 2)
+#: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts; with this deviation they have half
+#: the weight [m/s^2]. Gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01 beyond the noise.
+GUST_HIGH, CALM_CHANGE = 8.0, 0.02
+
+
+class PlaneForce(NamedTuple):
+    """Specific force of a tick."""
+
+    force: ca.SX  # in B [m/s^2], (3,)
+    density: ca.SX  # noise of a component in the wall plane [m^2/s^3]
+
+
+def plane_force(
+    signals: Signals, *, dt: ca.SX, measured: ca.SX, explained: ca.SX, normal: ca.SX, time_s: float
+) -> PlaneForce:
+    r"""Specific force by motors' model and accelerometer, and its noise.
+
+    .. math:: \hat f = f_{calm} + w (f - f_{calm}), \quad f_{calm} = f_{motors} + f_{contact} + f_{slow}
+
+    The motors' thrusts, the measured contact and a slow rest explain the acceleration but for gusts. The accelerometer
+    has the gusts, and the vibration: white noise of 1 m/s^2 at 250 Hz makes the tip sway by 4 mm, with the model by
+    3 mm. So w is 0 in calm air and 1 in gusts, by the changes in the wall plane of what motors and contact do not
+    explain, beyond the broadband noise. That is also the noise of the result, gusts included: the model errs about as
+    much.
+
+    Args:
+        signals: Registry of the filters' states.
+        dt: Time since the last tick [s].
+        measured: Accelerometer f [m/s^2], (3,).
+        explained: Specific force by motors and contact at the last tick [m/s^2], (3,); zero before the first command.
+        normal: Unit vector into the wall, in B, (3,).
+        time_s: Averaging time of the noise [s].
+    """
+    rest = measured - explained
+    rest -= ca.dot(rest, normal) * normal
+    begun, known = signals.state("plane.begun"), ca.sumsqr(explained) > 0.0
+    signals.remember("plane.begun", known)
+
+    def low_passed(name: str, value: ca.SX, bandwidth: float) -> ca.SX:
+        before = signals.state(f"plane.{name}", 3)
+        moved = before + filter_gain(bandwidth, dt) * (value - before)
+        return signals.remember(f"plane.{name}", where(begun, moved, rest))
+
+    twice = low_passed("noise_twice", low_passed("noise_once", rest, NOISE_HIGH), NOISE_HIGH)
+    shaken = ca.sumsqr(twice - low_passed("noise_slow", twice, NOISE_LOW)) / 2.0
+    power = signals.state("plane.noise_power")
+    power = signals.remember("plane.noise_power", power + filter_gain(1.0 / time_s, dt) * (shaken - power))
+    density = power / NOISE_POWER
+
+    fast = low_passed("fast", rest, GUST_HIGH)
+    slow = low_passed("slow", fast, SLOW_CHANGE)
+    changed = ca.sumsqr(fast - slow) / 2.0
+    gust = gust_weight(signals, "plane.change", dt, changed, density * GUST_HIGH / 2.0, CALM_CHANGE)
+    calm = explained + slow
+    return PlaneForce(calm + where(known, gust, 1.0) * (measured - calm), density)
+
+
+class PlaneAcceleration:
+    """The same on plain numbers.
+
+    Attributes:
+        force: Specific force in B [m/s^2], (3,).
+        density: Its noise in the wall plane [m^2/s^3].
+
+    Args:
+        time_s: Averaging time of the noise [s].
+        compiled: Whether it runs as machine code.
+    """
+
+    def __init__(self, time_s: float, compiled: bool = False) -> None:
+        signals = Signals()
+        found = plane_force(
+            signals,
+            dt=signals.input("dt"),
+            measured=signals.input("measured", 3),
+            explained=signals.input("explained", 3),
+            normal=signals.input("normal", 3),
+            time_s=time_s,
+        )
+        signals.output("force", found.force)
+        signals.output("density", found.density)
+        self._step = StepFunction(signals, to_machine_code=compiled)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state before the first tick."""
+        self._step.reset()
+        self.force, self.density = [0.0, 0.0, 0.0], 0.0
+
+    def update(
+        self, dt: float, measured: Sequence[float], explained: Sequence[float], normal: Sequence[float]
+    ) -> list[float]:
+        """Specific force of a tick; arguments as of `plane_force`."""
+        self._step.advance()
+        self._step.values[:] = dt, *measured, *explained, *normal
+        self._step.evaluate()
+        *self.force, self.density = self._step.results.tolist()
+        return self.force
