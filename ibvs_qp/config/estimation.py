@@ -28,6 +28,15 @@ class EstimationConfig:
         low=0.05,
         high=60.0,
     )
+    calm_change: float = setting(
+        0.02,
+        "changes of the acceleration in the wall plane that motors and contact do not explain: with these the motion is "
+        "half by the motors' model, half by the accelerometer; 0 integrates the accelerometer alone",
+        unit="m/s^2",
+        why="gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01 beyond the noise",
+        low=0.0,
+        high=10.0,
+    )
     line_noise: float = setting(
         1e-3, "random walk of line offsets: edges are not perfectly straight", unit="m/sqrt(s)", low=1e-6, high=0.1
     )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from ibvs_qp.config import EstimationConfig
 from ibvs_qp.estimation.push_disturbance import SLOW_CHANGE, filter_gain, gust_weight
 from ibvs_qp.symbolic.logic import where
 from ibvs_qp.symbolic.signals import Signals
@@ -17,9 +18,10 @@ from ibvs_qp.symbolic.step_function import StepFunction
 NOISE_LOW, NOISE_HIGH = 20.0, 60.0
 #: Power of white noise of unit density [1/s] behind two poles at `NOISE_HIGH` and one zero and pole at `NOISE_LOW`.
 NOISE_POWER = NOISE_HIGH**3 / (4.0 * (NOISE_HIGH + NOISE_LOW) ** 2)
-#: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts; with this deviation they have half
-#: the weight [m/s^2]. Gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01 beyond the noise.
-GUST_HIGH, CALM_CHANGE = 8.0, 0.02
+#: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts.
+GUST_HIGH = 8.0
+#: A change of this many times the power of noise and calm air is a gust at once: noise alone has it once in 8000 ticks.
+LEAP_POWERS = 9.0
 
 
 class PlaneForce(NamedTuple):
@@ -30,7 +32,7 @@ class PlaneForce(NamedTuple):
 
 
 def plane_force(
-    signals: Signals, *, dt: ca.SX, measured: ca.SX, explained: ca.SX, normal: ca.SX, time_s: float
+    signals: Signals, config: EstimationConfig, *, dt: ca.SX, measured: ca.SX, explained: ca.SX, normal: ca.SX
 ) -> PlaneForce:
     r"""Specific force by motors' model and accelerometer, and its noise.
 
@@ -44,11 +46,11 @@ def plane_force(
 
     Args:
         signals: Registry of the filters' states.
+        config: Averaging time of the noise, and the changes of half the weight.
         dt: Time since the last tick [s].
         measured: Accelerometer f [m/s^2], (3,).
         explained: Specific force by motors and contact at the last tick [m/s^2], (3,); zero before the first command.
         normal: Unit vector into the wall, in B, (3,).
-        time_s: Averaging time of the noise [s].
     """
     rest = measured - explained
     rest -= ca.dot(rest, normal) * normal
@@ -63,13 +65,19 @@ def plane_force(
     twice = low_passed("noise_twice", low_passed("noise_once", rest, NOISE_HIGH), NOISE_HIGH)
     shaken = ca.sumsqr(twice - low_passed("noise_slow", twice, NOISE_LOW)) / 2.0
     power = signals.state("plane.noise_power")
-    power = signals.remember("plane.noise_power", power + filter_gain(1.0 / time_s, dt) * (shaken - power))
+    power = signals.remember("plane.noise_power", power + filter_gain(1.0 / config.vibration_time_s, dt) * (shaken - power))
     density = power / NOISE_POWER
 
     fast = low_passed("fast", rest, GUST_HIGH)
     slow = low_passed("slow", fast, SLOW_CHANGE)
     changed = ca.sumsqr(fast - slow) / 2.0
-    gust = gust_weight(signals, "plane.change", dt, changed, density * GUST_HIGH / 2.0, CALM_CHANGE)
+    gust: ca.SX | float = 1.0
+    if config.calm_change:
+        noise = density * GUST_HIGH / 2.0
+        gust = gust_weight(signals, "plane.change", dt, changed, noise, config.calm_change)
+        least = config.calm_change**2 + noise
+        leap = ca.fmax(changed - LEAP_POWERS * least, 0.0)
+        gust = ca.fmax(gust, leap / (leap + least))
     calm = explained + slow
     return PlaneForce(calm + where(known, gust, 1.0) * (measured - calm), density)
 
@@ -82,19 +90,19 @@ class PlaneAcceleration:
         density: Its noise in the wall plane [m^2/s^3].
 
     Args:
-        time_s: Averaging time of the noise [s].
+        config: Averaging time of the noise, and the changes of half the weight.
         compiled: Whether it runs as machine code.
     """
 
-    def __init__(self, time_s: float, compiled: bool = False) -> None:
+    def __init__(self, config: EstimationConfig, compiled: bool = False) -> None:
         signals = Signals()
         found = plane_force(
             signals,
+            config,
             dt=signals.input("dt"),
             measured=signals.input("measured", 3),
             explained=signals.input("explained", 3),
             normal=signals.input("normal", 3),
-            time_s=time_s,
         )
         signals.output("force", found.force)
         signals.output("density", found.density)

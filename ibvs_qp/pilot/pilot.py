@@ -124,7 +124,7 @@ class Pilot:
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self._plane_acceleration = PlaneAcceleration(self.config.estimation.vibration_time_s, settings.compiled)
+        self._plane_acceleration = PlaneAcceleration(self.config.estimation, settings.compiled)
         self._history = AttitudeHistory(self.motion.ticks)
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)

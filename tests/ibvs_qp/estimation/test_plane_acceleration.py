@@ -1,0 +1,83 @@
+"""Specific force for the motion in the wall plane, by the motors' model and the accelerometer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ibvs_qp.config import EstimationConfig
+from ibvs_qp.estimation.plane_acceleration import PlaneAcceleration
+
+TICK, NORMAL = 0.004, (1.0, 0.0, 0.0)
+HOVER = np.array([0.0, 0.0, -9.81])
+
+
+def fly(
+    seconds: float = 20.0,
+    noise: float = 0.0,
+    wind: Callable[[float], float] = lambda time: 0.0,
+    config: EstimationConfig | None = None,
+) -> tuple[np.ndarray, np.ndarray, list[float]]:
+    """Hover in wind along y [m/s^2] with noise of the accelerometer [m/s^2 a sample].
+
+    Returns:
+        Estimate less truth, in B [m/s^2], (n, 3), the truth (n, 3), and the noise found [m^2/s^3].
+    """
+    estimator, rng = PlaneAcceleration(config or EstimationConfig()), np.random.default_rng(0)
+    truths, errors, densities = [], [], []
+    for tick in range(round(seconds / TICK)):
+        truth = HOVER + (0.0, wind(tick * TICK), 0.0)
+        measured = truth + noise * rng.standard_normal(3)
+        errors.append(np.array(estimator.update(TICK, measured, HOVER, NORMAL)) - truth)
+        truths.append(truth)
+        densities.append(estimator.density)
+    return np.array(errors), np.array(truths), densities
+
+
+def test_the_accelerometer_alone_counts_before_the_first_command() -> None:
+    estimator = PlaneAcceleration(EstimationConfig())
+    for measured in ([0.3, -0.2, -9.7], [0.1, 0.4, -9.9]):
+        assert estimator.update(TICK, measured, (0.0, 0.0, 0.0), NORMAL) == pytest.approx(measured)
+
+
+@pytest.mark.parametrize("noise", [0.06, 1.0, 2.0])
+def test_white_noise_is_measured_and_no_motion(noise: float) -> None:
+    errors, _, densities = fly(noise=noise)
+    density = noise**2 * TICK
+    assert np.mean(densities[1000:]) == pytest.approx(density, rel=0.15)
+    # In the quarter of a second that a line's loop takes, the accelerometer's noise makes a velocity of this deviation.
+    velocity = TICK * errors[1000:4969, 1:].reshape(-1, 63, 2).sum(axis=1)
+    assert velocity.std() < 0.4 * math.sqrt(density * 0.25)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.06])
+def test_gusts_are_motion(noise: float) -> None:
+    """Gusts of 2 N on 4 kg, at 0.3 and 0.8 Hz."""
+
+    def wind(time: float) -> float:
+        return 0.5 * math.sin(2.0 * math.pi * 0.3 * time) + 0.4 * math.sin(2.0 * math.pi * 0.8 * time)
+
+    errors, truths, _ = fly(wind=wind, noise=noise)
+    assert errors[1000:, 1].std() < 0.1 * truths[1000:, 1].std() + noise
+
+
+def test_a_steady_wind_is_followed() -> None:
+    errors, *_ = fly(wind=lambda time: 0.5, noise=0.06)
+    assert abs(errors[2000:, 1].mean()) < 0.02
+
+
+def test_without_a_calm_change_the_accelerometer_alone_counts() -> None:
+    errors, *_ = fly(seconds=1.0, noise=1.0, config=EstimationConfig(calm_change=0.0))
+    assert errors.std() == pytest.approx(1.0, rel=0.1)
+
+
+
+
+def test_reset_forgets() -> None:
+    estimator = PlaneAcceleration(EstimationConfig())
+    first = [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, NORMAL) for tick in range(50)]
+    estimator.reset()
+    assert first == [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, NORMAL) for tick in range(50)]
