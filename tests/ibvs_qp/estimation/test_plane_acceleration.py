@@ -69,6 +69,14 @@ def test_a_steady_wind_is_followed() -> None:
     assert abs(errors[2000:, 1].mean()) < 0.02
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.06])
+def test_a_wind_that_leaps_is_motion_at_once(noise: float) -> None:
+    """A wind of 8 m/s leaps to 0.6 m/s^2; by the rest of the model alone the velocity would be 0.2 m/s wrong."""
+    errors, *_ = fly(wind=lambda time: 0.6 * (time > 5.0), noise=noise)
+    velocity = TICK * errors[1250:, 1].cumsum()
+    assert abs(velocity[:125]).max() < 0.03
+
+
 def test_without_a_calm_change_the_accelerometer_alone_counts() -> None:
     errors, *_ = fly(seconds=1.0, noise=1.0, config=EstimationConfig(calm_change=0.0))
     assert errors.std() == pytest.approx(1.0, rel=0.1)
