@@ -29,11 +29,11 @@ class EstimationConfig:
         high=60.0,
     )
     calm_change: float = setting(
-        0.02,
+        0.01,
         "changes of the acceleration in the wall plane that motors and contact do not explain: with these the motion is "
         "half by the motors' model, half by the accelerometer; 0 integrates the accelerometer alone",
         unit="m/s^2",
-        why="gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01 beyond the noise",
+        why="gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01, of which most is noise",
         low=0.0,
         high=10.0,
     )
