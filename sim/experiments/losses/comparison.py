@@ -95,7 +95,8 @@ def _against(
             pairs=len(alone),
         )
     ]
-    columns = [each for each in experiment(name).columns if each.better and each.where.items() <= params.items()]
+    shown = [each for each in experiment(name).columns if each.better and each.where.items() <= params.items()]
+    columns = [each for each in shown if each.metric in both.columns]
     result = differences(mine, theirs, [column.metric for column in columns])["differences"]
     return found + [_of(column, result[column.metric], cell) for column in columns if column.metric in result]
 

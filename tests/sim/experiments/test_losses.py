@@ -1,0 +1,73 @@
+"""Comparisons of the QP with its opponents: who flies which cell, and what counts as lost."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import polars as pl
+import pytest
+
+from sim.experiments.losses.comparison import Comparison, comparisons
+from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
+
+CELL = {"experiment": "friction", "param.world": "ideal", "param.friction": 0.8}
+
+
+def rows(law: str, variant: str, values: list[float], completed: list[bool] | None = None) -> pl.DataFrame:
+    """Flights of a cell with these push errors [N]."""
+    table = {"seed": range(len(values)), "completed": completed or [True] * len(values), "force_rms_n": values}
+    return (
+        pl.DataFrame(table)
+        .with_columns(*(pl.lit(value).alias(name) for name, value in CELL.items()))
+        .with_columns(pl.lit(law).alias("law"), pl.lit(variant).alias("variant"))
+    )
+
+
+def compared(**theirs: Any) -> dict[str, Comparison]:
+    """Comparisons of ten flights of the QP, of 0.1 to 0.19 N, with the box-constrained analytic law, by figure."""
+    mine = rows("qp", "standard", [0.1 + 0.01 * seed for seed in range(10)], theirs.pop("mine", None))
+    found = comparisons(pl.concat((mine, rows("paper", "box", **theirs))))
+    assert all(each.opponent == "analytic law, box" for each in found)
+    return {each.words.split(",")[0]: each for each in found}
+
+
+@pytest.mark.parametrize("name", COMPARED)
+def test_every_opponent_flies_every_cell_of_the_qp_with_its_seeds(name: str) -> None:
+    flown: dict[tuple[str, str], dict[tuple[str, str], set[int]]] = {}
+    for run in runs_of((name,)):
+        assert run.plan.options.features == "geometric"
+        cell = flown.setdefault((str(run.params), base_of(run.variant)), {})
+        cell.setdefault((run.law, run.variant), set()).add(run.seed)
+    assert flown
+    for (_, base), laws in flown.items():
+        prefix = "" if base == "standard" else f"{base}-"
+        allocators = {("paper", f"{prefix}{each}") for each in ("sequential", "box")} if name in LIMITED else set()
+        opponents = {("paper", base), ("paper", f"{prefix}shared-gains"), ("qp", f"{prefix}mpc")} | allocators
+        assert set(laws) == {("qp", base)} | opponents
+        assert len({frozenset(seeds) for seeds in laws.values()}) == 1 and len(laws["qp", base]) == 10
+
+
+def test_the_rival_flies_the_rival_and_the_reach_check_is_off_where_named() -> None:
+    for run in runs_of(("saturation",)):
+        assert (run.plan.options.rival == "mpc") is run.variant.endswith("mpc")
+        assert run.plan.config.controller.reach_check is not run.variant.startswith("no-reach-check")
+
+
+def test_a_comparison_is_lost_when_the_whole_interval_is_worse_than_what_matters() -> None:
+    least = compared(values=[0.1] * 10)["push error"].least
+    for better, lost in ((1.2 * least, True), (0.8 * least, False), (-2.0 * least, False)):
+        found = compared(values=[0.1 + 0.01 * seed - better for seed in range(10)])["push error"]
+        assert found.worse == pytest.approx(better) and found.pairs == 10
+        assert found.lost is lost and found.won is (better < -least)
+
+
+def test_one_bad_seed_of_ten_decides_nothing() -> None:
+    values = [0.1 + 0.01 * seed for seed in range(10)]
+    assert not compared(values=[values[0] - 5.0, *values[1:]])["push error"].lost
+
+
+@pytest.mark.parametrize(("failed", "lost"), [(5, False), (6, True)])
+def test_flights_that_only_the_opponent_completes_are_lost(failed: int, lost: bool) -> None:
+    found = compared(values=[0.1] * 10, mine=[seed >= failed for seed in range(10)])
+    assert found["flights completed by one law alone"].lost is lost
+    assert found["flights completed by one law alone"].pairs == failed
