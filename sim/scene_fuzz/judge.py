@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,11 +36,13 @@ class Judged:
     moved: dict[str, Any]  # keys of a draw and their values
     outcome: str  # of `OUTCOMES`
     reason: str  # of the refusal, the pilot, the truth or the traceback
+    push: float = math.nan  # hardest push over that of the job; NaN without a flight
 
     def __str__(self) -> str:
         """One line."""
         keys = ", ".join(f"{path} = {_short(value)}" for path, value in self.moved.items())
-        return f"{self.name}: {self.outcome}: {f'{keys}: ' if keys else ''}{self.reason}"
+        push = f" (push {self.push:.1f} x)" if self.push > 2.0 else ""
+        return f"{self.name}: {self.outcome}: {f'{keys}: ' if keys else ''}{self.reason}{push}"
 
 
 def _short(value: Any) -> str:
@@ -74,8 +77,9 @@ def _judged(
         return Judged(name=name, moved=moved, outcome=REFUSED, reason=str(refusal))
     except Exception:  # any other error is a finding
         return Judged(name=name, moved=moved, outcome=INTERNAL, reason=traceback.format_exc().replace("\n", " | "))
-    if trace.reason.startswith(CRASH):
-        return Judged(name=name, moved=moved, outcome=CRASHED, reason=trace.reason)
-    completed, claimed = figures["completed"], figures["claimed"]
+    completed, claimed, push = figures["completed"], figures["claimed"], figures["push_peak_ratio"]
     outcome = (COMPLETE if claimed else UNCLAIMED) if completed else FALSE_CLAIM if claimed else FAILED
-    return Judged(name=name, moved=moved, outcome=outcome, reason=f"{trace.reason}; {figures['not_completed']}")
+    if crashed := trace.reason.startswith(CRASH):
+        outcome = CRASHED
+    reason = trace.reason if crashed else f"{trace.reason}; {figures['not_completed']}"
+    return Judged(name=name, moved=moved, outcome=outcome, reason=reason, push=push)

@@ -1,5 +1,6 @@
 """Drawn scenes cover every key over its range, and their flights are judged by the truth."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -9,6 +10,7 @@ from sim.flight.preflight import job_problems
 from sim.scene_fuzz import judge as judging
 from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
 from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
+from sim.world.scene import Scene, load_scene
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
 #: Draws of the slow test; the command `python -m sim.scene_fuzz` flies others.
@@ -53,10 +55,11 @@ def test_draws_that_take_too_long_are_drawn_again_and_strokes_fit_the_board():
 def test_outcome_is_what_the_truth_makes_of_the_claim(monkeypatch, completed, claimed, reason, outcome):
     monkeypatch.setattr(judging, "fly", lambda scene, options: SimpleNamespace(reason=reason))
     figures = {"completed": completed, "claimed": claimed, "not_completed": None if completed else "row 1: short"}
+    figures["push_peak_ratio"] = 3.0
     monkeypatch.setattr(judging, "compute_metrics", lambda trace: figures)
     judged = judge_draw(0, OPTIONS, "datasheet", 150.0)
     assert judged.outcome == outcome and (outcome in BAD) == outcome.isupper()
-    assert reason in str(judged)
+    assert reason in str(judged) and str(judged).endswith("(push 3.0 x)")
 
 
 def test_refusals_and_internal_errors_are_told_apart(monkeypatch):
@@ -80,3 +83,11 @@ def test_a_scene_of_a_file_is_refused_by_name(tmp_path):
 def test_no_drawn_scene_crashes_breaks_or_is_claimed_falsely(seed):
     judged = judge_draw(seed, OPTIONS, "datasheet", 100.0)
     assert judged.outcome not in BAD, str(judged)
+
+
+@pytest.mark.parametrize("features", ["geometric", "rendered"])
+def test_the_hard_scenes_can_be_read_and_say_what_they_were(features):
+    files = sorted((Path(judging.__file__).with_name("hard") / features).glob("*.toml"))
+    assert len(files) >= 3
+    for file in files:
+        assert load_scene(file) != Scene() and file.read_text().startswith("# Kind ")
