@@ -23,17 +23,17 @@ class EstimationConfig:
     )
     vibration_time_s: float = setting(
         1.0,
-        "averaging time of the accelerometer's noise; it replaces a smaller acceleration_noise",
+        "averaging time of the accelerometer's broadband noise; it replaces a smaller acceleration_noise",
         unit="s",
         low=0.05,
         high=60.0,
     )
     calm_change: float = setting(
         0.01,
-        "changes of the acceleration in the wall plane that motors and contact do not explain: with these the motion is "
-        "half by the motors' model, half by the accelerometer; 0 integrates the accelerometer alone",
+        "changes of the acceleration in the wall plane, beyond motors and contact, at which motors' model and "
+        "accelerometer have equal weights; 0 uses the accelerometer alone",
         unit="m/s^2",
-        why="gusts of 2 N have 0.25 m/s^2, calm air of the datasheet world 0.01, of which most is noise",
+        why="gusts of 2 N change it by 0.25 m/s^2, errors of the model in calm air by 0.01",
         low=0.0,
         high=10.0,
     )

@@ -15,13 +15,15 @@ from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Band of the accelerometer's broadband noise [rad/s]: above the gusts, below the lines of the rotors, which integrate
 #: to nothing.
-NOISE_LOW, NOISE_HIGH = 20.0, 60.0
+NOISE_LOW, NOISE_HIGH = 60.0, 120.0
 #: Power of white noise of unit density [1/s] behind two poles at `NOISE_HIGH` and one zero and pole at `NOISE_LOW`.
 NOISE_POWER = NOISE_HIGH**3 / (4.0 * (NOISE_HIGH + NOISE_LOW) ** 2)
 #: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts.
 GUST_HIGH = 8.0
 #: A change of this many times the power of noise and calm air is a gust at once: noise alone has it once in 8000 ticks.
 LEAP_POWERS = 9.0
+#: Power of the changes of an accelerometer without any noise [m^2/s^4].
+LEAST_POWER = 1e-12
 
 
 class PlaneForce(NamedTuple):
@@ -38,48 +40,54 @@ def plane_force(
 
     .. math:: \hat f = f_{calm} + w (f - f_{calm}), \quad f_{calm} = f_{motors} + f_{contact} + f_{slow}
 
-    The motors' thrusts, the measured contact and a slow rest explain the acceleration but for gusts. The accelerometer
-    has the gusts, and the vibration: white noise of 1 m/s^2 at 250 Hz makes the tip sway by 4 mm, with the model by
-    3 mm. So w is 0 in calm air and 1 in gusts, by the changes in the wall plane of what motors and contact do not
-    explain, beyond the broadband noise. That is also the noise of the result, gusts included: the model errs about as
-    much.
+    The motors' thrusts, the measured contact and a slow rest explain the acceleration except for gusts. The
+    accelerometer measures gusts and vibration: white noise of 1 m/s^2 at 250 Hz makes the tip sway by 4 mm, with the
+    model by 3 mm. So w is 0 in calm air and near 1 in gusts. It follows the changes in the wall plane that motors and
+    contact do not explain, beyond the accelerometer's broadband noise. That noise is also the noise of the result: in
+    calm air the model has about the same error.
 
     Args:
         signals: Registry of the filters' states.
-        config: Averaging time of the noise, and the changes of half the weight.
+        config: Averaging time of the noise, and the changes at which w is one half.
         dt: Time since the last tick [s].
         measured: Accelerometer f [m/s^2], (3,).
         explained: Specific force by motors and contact at the last tick [m/s^2], (3,); zero before the first command.
         normal: Unit vector into the wall, in B, (3,).
     """
-    rest = measured - explained
-    rest -= ca.dot(rest, normal) * normal
-    begun, known = signals.state("plane.begun"), ca.sumsqr(explained) > 0.0
-    signals.remember("plane.begun", known)
+    known = ca.sumsqr(explained) > 0.0
+    across = ca.SX.eye(3) - normal @ normal.T
+    rest = where(known, across @ (measured - explained), 0.0)
+    density = _noise_density(signals, across @ measured, dt, config.vibration_time_s)
 
-    def low_passed(name: str, value: ca.SX, bandwidth: float) -> ca.SX:
-        before = signals.state(f"plane.{name}", 3)
-        moved = before + filter_gain(bandwidth, dt) * (value - before)
-        return signals.remember(f"plane.{name}", where(begun, moved, rest))
-
-    twice = low_passed("noise_twice", low_passed("noise_once", rest, NOISE_HIGH), NOISE_HIGH)
-    shaken = ca.sumsqr(twice - low_passed("noise_slow", twice, NOISE_LOW)) / 2.0
-    power = signals.state("plane.noise_power")
-    power = signals.remember("plane.noise_power", power + filter_gain(1.0 / config.vibration_time_s, dt) * (shaken - power))
-    density = power / NOISE_POWER
-
-    fast = low_passed("fast", rest, GUST_HIGH)
-    slow = low_passed("slow", fast, SLOW_CHANGE)
+    fast, slow = signals.state("plane.fast", 3), signals.state("plane.slow", 3)
+    fast = signals.remember("plane.fast", fast + filter_gain(GUST_HIGH, dt) * (rest - fast))
+    slow = signals.remember("plane.slow", slow + filter_gain(SLOW_CHANGE, dt) * (fast - slow))
     changed = ca.sumsqr(fast - slow) / 2.0
     gust: ca.SX | float = 1.0
     if config.calm_change:
-        noise = density * GUST_HIGH / 2.0
+        noise = density * GUST_HIGH / 2.0 + LEAST_POWER
         gust = gust_weight(signals, "plane.change", dt, changed, noise, config.calm_change)
         least = config.calm_change**2 + noise
         leap = ca.fmax(changed - LEAP_POWERS * least, 0.0)
         gust = ca.fmax(gust, leap / (leap + least))
     calm = explained + slow
-    return PlaneForce(calm + where(known, gust, 1.0) * (measured - calm), density)
+    return PlaneForce(where(known, calm + gust * (measured - calm), measured), density)
+
+
+def _noise_density(signals: Signals, across: ca.SX, dt: ca.SX, time_s: float) -> ca.SX:
+    """Density of a component's broadband noise [m^2/s^3], of the accelerometer in the wall plane [m/s^2], (3,)."""
+    begun = signals.state("plane.begun")
+    signals.remember("plane.begun", ca.SX(1.0))
+
+    def low_passed(name: str, value: ca.SX, bandwidth: float) -> ca.SX:
+        before = signals.state(f"plane.{name}", 3)
+        moved = before + filter_gain(bandwidth, dt) * (value - before)
+        return signals.remember(f"plane.{name}", where(begun, moved, across))
+
+    twice = low_passed("noise_twice", low_passed("noise_once", across, NOISE_HIGH), NOISE_HIGH)
+    shaken = ca.sumsqr(twice - low_passed("noise_slow", twice, NOISE_LOW)) / 2.0
+    power = signals.state("plane.noise_power")
+    return signals.remember("plane.noise_power", power + filter_gain(1.0 / time_s, dt) * (shaken - power)) / NOISE_POWER
 
 
 class PlaneAcceleration:
@@ -90,7 +98,7 @@ class PlaneAcceleration:
         density: Its noise in the wall plane [m^2/s^3].
 
     Args:
-        config: Averaging time of the noise, and the changes of half the weight.
+        config: Averaging time of the noise, and the changes at which w is one half.
         compiled: Whether it runs as machine code.
     """
 

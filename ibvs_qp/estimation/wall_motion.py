@@ -108,7 +108,7 @@ class WallMotion:
         specific_force: Sequence[float],
         omega: Sequence[float],
         dt: float,
-        density: float = 0.0,
+        density: float,
     ) -> None:
         """Integrate specific force and gyro over a tick; the tip moves with the body's rotation, too.
 

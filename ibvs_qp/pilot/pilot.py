@@ -262,6 +262,7 @@ class Pilot:
             self._leaps = self._gate.clock.leaps
             self.contact.doubt()
             self.motion.doubt()
+            self._plane_acceleration.reset()
         frame = self._levelled(self._in_body(frame), dt)
         attitude, rate, force = self._inertial.attitude, self._inertial.rate, self._inertial.force
         down = down_in_body(attitude)

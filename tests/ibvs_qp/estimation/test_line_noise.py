@@ -69,7 +69,7 @@ class Row:
             here, ahead = self.right(self.tick), self.right(self.tick + 1)
             gain = (ahead - 2 * here + self.right(self.tick - 1)) / TICK**2 if self.tick else 0.0
             self.tick += 1
-            self.motion.predict(self.tick * TICK_NS, self.axes, (0.0, gain, -9.81), (0.0, 0.0, 0.0), TICK)
+            self.motion.predict(self.tick * TICK_NS, self.axes, (0.0, gain, -9.81), (0.0, 0.0, 0.0), TICK, 0.0)
             if self.tick % 8 == 0 and self.tick > LATE:
                 self.motion.correct(self.picture(self.tick - LATE), self.axes, 0.0)
                 self.pictures += 1

@@ -29,7 +29,7 @@ def fly(
     estimator, rng = PlaneAcceleration(config or EstimationConfig()), np.random.default_rng(0)
     truths, errors, densities = [], [], []
     for tick in range(round(seconds / TICK)):
-        truth = HOVER + (0.0, wind(tick * TICK), 0.0)
+        truth = HOVER + np.array((0.0, wind(tick * TICK), 0.0))
         measured = truth + noise * rng.standard_normal(3)
         errors.append(np.array(estimator.update(TICK, measured, HOVER, NORMAL)) - truth)
         truths.append(truth)
@@ -47,7 +47,7 @@ def test_the_accelerometer_alone_counts_before_the_first_command() -> None:
 def test_white_noise_is_measured_and_no_motion(noise: float) -> None:
     errors, _, densities = fly(noise=noise)
     density = noise**2 * TICK
-    assert np.mean(densities[1000:]) == pytest.approx(density, rel=0.15)
+    assert np.mean(densities[1000:]) == pytest.approx(density, rel=0.25)
     # In the quarter of a second that a line's loop takes, the accelerometer's noise makes a velocity of this deviation.
     velocity = TICK * errors[1000:4969, 1:].reshape(-1, 63, 2).sum(axis=1)
     assert velocity.std() < 0.4 * math.sqrt(density * 0.25)
@@ -55,13 +55,34 @@ def test_white_noise_is_measured_and_no_motion(noise: float) -> None:
 
 @pytest.mark.parametrize("noise", [0.0, 0.06])
 def test_gusts_are_motion(noise: float) -> None:
-    """Gusts of 2 N on 4 kg, at 0.3 and 0.8 Hz."""
+    """Gusts of 3 N on 6 kg, at 0.3 and 0.8 Hz."""
 
     def wind(time: float) -> float:
         return 0.5 * math.sin(2.0 * math.pi * 0.3 * time) + 0.4 * math.sin(2.0 * math.pi * 0.8 * time)
 
     errors, truths, _ = fly(wind=wind, noise=noise)
     assert errors[1000:, 1].std() < 0.1 * truths[1000:, 1].std() + noise
+
+
+@pytest.mark.parametrize("seconds", [0.2, 1.0])
+def test_an_error_of_the_motors_model_is_no_noise_and_no_motion(seconds: float) -> None:
+    """The model errs by 0.5 m/s^2 with this period while the vehicle hovers: rotors slower than assumed."""
+    estimator, rng, errors = PlaneAcceleration(EstimationConfig()), np.random.default_rng(0), []
+    for tick in range(5000):
+        explained = HOVER + np.array((0.0, 0.5 * math.sin(2.0 * math.pi * tick * TICK / seconds), 0.0))
+        measured = HOVER + 0.06 * rng.standard_normal(3)
+        errors.append(estimator.update(TICK, measured, explained, NORMAL)[1] - measured[1])
+    assert np.std(errors[1000:]) < 0.15 * 0.5 / math.sqrt(2.0)
+    assert estimator.density < 3.0 * 0.06**2 * TICK
+
+
+def test_a_spike_of_the_force_sensor_leaves_the_noise() -> None:
+    """150 N for 10 ms in the wall plane."""
+    estimator, rng = PlaneAcceleration(EstimationConfig()), np.random.default_rng(0)
+    for tick in range(2500):
+        explained = HOVER + np.array((0.0, 25.0 * (2000 <= tick < 2003), 0.0))
+        force = estimator.update(TICK, HOVER + 0.06 * rng.standard_normal(3), explained, NORMAL)
+    assert abs(force[1]) < 0.3 and estimator.density < 2.0 * 0.06**2 * TICK
 
 
 def test_a_steady_wind_is_followed() -> None:
@@ -71,7 +92,7 @@ def test_a_steady_wind_is_followed() -> None:
 
 @pytest.mark.parametrize("noise", [0.0, 0.06])
 def test_a_wind_that_leaps_is_motion_at_once(noise: float) -> None:
-    """A wind of 8 m/s leaps to 0.6 m/s^2; by the rest of the model alone the velocity would be 0.2 m/s wrong."""
+    """A wind of 4 m/s: 3.6 N on 6 kg. By the rest of the model alone the velocity would be 0.2 m/s wrong."""
     errors, *_ = fly(wind=lambda time: 0.6 * (time > 5.0), noise=noise)
     velocity = TICK * errors[1250:, 1].cumsum()
     assert abs(velocity[:125]).max() < 0.03
@@ -80,8 +101,6 @@ def test_a_wind_that_leaps_is_motion_at_once(noise: float) -> None:
 def test_without_a_calm_change_the_accelerometer_alone_counts() -> None:
     errors, *_ = fly(seconds=1.0, noise=1.0, config=EstimationConfig(calm_change=0.0))
     assert errors.std() == pytest.approx(1.0, rel=0.1)
-
-
 
 
 def test_reset_forgets() -> None:

@@ -75,7 +75,7 @@ def still_beside(kind: str, seconds: float, swing_m_s: float = 0.0, segment: np.
     wall, motion = Wall(LEVEL, 0.0), WallMotion(TIP, CAMERA, TICK)
     axes = axes_of(wall)
     for tick in range(1, round(seconds / TICK)):
-        motion.predict(tick * TICK_NS, axes, np.array([0.0, 0.0, -9.81]), np.zeros(3), TICK)
+        motion.predict(tick * TICK_NS, axes, np.array([0.0, 0.0, -9.81]), np.zeros(3), TICK, 0.0)
         if tick % 8 == 0 and tick > 15:
             offset = 0.05 + swing_m_s * math.sin(2.0 * math.pi * 0.3 * (tick - 15) * TICK) / (2.0 * math.pi * 0.3)
             fields = {"covariance": np.eye(2) * 1e-8, "track_id": 1, "kind": kind, "segment": segment}

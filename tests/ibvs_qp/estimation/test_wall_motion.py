@@ -94,7 +94,7 @@ class Stroke:
             tick = self.tick
             gain = (self.speed_at(tick + 1) - self.speed_at(tick)) / TICK
             force = np.array([0.0, gain[0] + 0.03, gain[1] - 9.81 + 0.02])
-            self.motion.predict((tick + 1) * TICK_NS, self.axes, force, np.zeros(3), TICK)
+            self.motion.predict((tick + 1) * TICK_NS, self.axes, force, np.zeros(3), TICK, 0.0)
             self.tip.append(self.tip[-1] + TICK * self.speed_at(tick))
             self.tick = tick = tick + 1
             if tick % 8 == 0 and tick > self.late:
@@ -221,12 +221,12 @@ def test_turning_moves_the_tip_and_not_the_lines() -> None:
     """Yaw of the body sweeps the tip sideways: the upright line goes the other way, the odometer with the tip."""
     motion, wall = WallMotion(TIP, CAMERA, TICK), Wall(LEVEL, 0.0)
     axes = axes_of(wall)
-    motion.predict(TICK_NS, axes, np.array([0, 0, -9.81]), np.zeros(3), TICK)
+    motion.predict(TICK_NS, axes, np.array([0, 0, -9.81]), np.zeros(3), TICK, 0.0)
     line = wall.line(-0.05, 0.0, VERTICAL, covariance=np.eye(2) * 1e-8, track_id=7)
     motion.correct(FeatureFrame(lines=(line,), plane=None, stamp_ns=TICK_NS), axes, 0.0)
     start = motion.lines[7].offset
     for k in range(10):
-        motion.predict((k + 2) * TICK_NS, axes, np.array([0, 0, -9.81]), np.array([0, 0, 0.1]), TICK)
+        motion.predict((k + 2) * TICK_NS, axes, np.array([0, 0, -9.81]), np.array([0, 0, 0.1]), TICK, 0.0)
     assert motion.state[ODOMETER][0] == pytest.approx(0.7 * 0.1 * 10 * TICK, abs=1e-6)
     assert motion.lines[7].offset - start == pytest.approx(-0.7 * 0.1 * 10 * TICK, abs=1e-6)
 
@@ -239,7 +239,7 @@ def test_more_lines_than_slots_and_reset() -> None:
     def run() -> list[float]:
         states = []
         for k in range(40):
-            motion.predict((k + 1) * TICK_NS, axes, force, np.zeros(3), TICK)
+            motion.predict((k + 1) * TICK_NS, axes, force, np.zeros(3), TICK, 0.0)
             lines: list[LineFeature] = [
                 wall.line(0.01 * i, 0.5 * math.pi, HORIZONTAL, covariance=np.eye(2) * 1e-6, track_id=i + 1)
                 for i in range(12)
