@@ -1,8 +1,9 @@
 """Processor time of a tick against another revision; prints one line of JSON.
 
-Run as ``python benchmarks/revision.py 1262c78 --rounds 5``. Both revisions fly the same scene in turn, each in a
-process of its own: the law alone (`HybridController.step`) and the whole tick (`Pilot.step`, geometric features). Times
-are medians over the ticks of a round; the ratio is the median over the rounds.
+Run as ``python benchmarks/revision.py 1262c78 --rounds 5``. The working tree and the revision fly the same scene in
+turn, each with its own simulator and preset, in a process of its own: the law alone (`HybridController.step`) and the
+whole tick (`Pilot.step`, geometric features). Times are medians over the ticks of a round; the ratio is the median over
+the rounds.
 """
 
 from __future__ import annotations
@@ -69,13 +70,15 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="flights of each revision")
     parser.add_argument("--ticks", type=int, default=4000, help="ticks of a flight (4000: 16 s)")
     given = parser.parse_args()
+    if given.rounds < 1 or given.ticks <= WARM_UP:
+        parser.error(f"--rounds must be at least 1, --ticks above {WARM_UP}")
     with tempfile.TemporaryDirectory() as folder:
         other = Path(folder)
         archive = ["git", "archive", "--format=tar", given.revision]
         packed = subprocess.run(archive, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout  # nosec B603
         with tarfile.open(fileobj=io.BytesIO(packed)) as tar:
             tar.extractall(folder, filter="data")
-        pairs = [(measured(ROOT, given.ticks), measured(other, given.ticks)) for _ in range(given.rounds)]
+        pairs = [[measured(tree, given.ticks) for tree in (ROOT, other)] for _ in range(given.rounds)]
     found = {}
     for index, name in enumerate(("tick", "law")):
         here, there = ([pair[side][index] for pair in pairs] for side in (0, 1))

@@ -1,8 +1,9 @@
 """``python -m sim.scene_fuzz --draws 150 --first-seed 1000``: fly drawn scenes and count their outcomes.
 
-``--scenes FOLDER`` flies the scenes of a folder instead: none of them may fail, or with ``--may-fail`` none may end but
-safely, and none may push harder than 2.5 times the reference. ``sim/scene_fuzz/hard`` has the scenes that once crashed
-or shook. Prints every scene that is not complete, then figure, goal and n; exits 1 when a goal is missed.
+``--scenes FOLDER`` flies the scenes of a folder instead: none may fail, and none may push harder than 2.5 times the
+reference. With ``--may-fail`` they may fail, but not crash, break or be claimed falsely. ``sim/scene_fuzz/hard`` has
+scenes that once crashed or shook. Prints every scene that is not complete, then figure, goal and n; exits 1 when a goal
+is missed.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from sim.world.worlds import DEFAULT_WORLD, world_names
 
 #: Longest time of the strokes of a drawn scene [s]; ten times that of the default one would take a day for 150 draws.
 LONGEST_S = 150.0
-#: Hardest push over the reference in the scenes of a folder: goal of the fault matrix, too.
+#: Hardest push over the reference in the scenes of a folder.
 HARDEST_PUSH = 2.5
 
 

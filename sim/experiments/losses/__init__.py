@@ -1,1 +1,1 @@
-"""Where the QP is worse than the best analytic law or the predictive rival, over nine experiments."""
+"""Where the QP is worse than the analytic law at its best or the predictive rival, over nine experiments."""

@@ -1,8 +1,9 @@
 """``python -m sim.experiments.losses --part 1 --of 4 --jobs 2``: fly a part, print where the QP loses and wins.
 
-A comparison is one figure of one cell against one opponent: the analytic law with its own gains or those of the QP,
-with clipping or another allocator, and the predictive rival. It is lost when the exact interval of the paired median is
-worse than the least difference that matters as a whole. Exits 1 when more than three are lost, or flights are missing.
+A comparison is one figure of one cell against one opponent: the analytic law with its own gains or those of the QP, and
+where limits act also with another allocator, and the predictive rival. It is lost when the whole exact interval of the
+paired median is worse than the least difference that matters. Exits 1 when more than three are lost, flights are
+missing, or a flight ended with an error.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ import argparse
 import sys
 from collections import Counter
 
+import polars as pl
 from rich.console import Console
 
 from sim.evaluate.table import terminal_table
-from sim.experiments.losses.comparison import comparisons
+from sim.experiments.losses.comparison import Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, runs_of
 from sim.experiments.part_of_flights import add_part_options, fly_part, parse_part
 
@@ -30,24 +32,26 @@ def main() -> int:
     given = parse_part(parser)
     if unknown := set(given.experiments) - set(COMPARED):
         parser.error(f"unknown experiment {', '.join(sorted(unknown))}; choose of {', '.join(COMPARED)}")
-    runs = runs_of(tuple(given.experiments))
-    table, interrupted = fly_part(runs, runs, given, "losses")
-    console, found = Console(), comparisons(table)
+    runs = runs_of(tuple(dict.fromkeys(given.experiments)))
+    flown, interrupted = fly_part(runs, runs, given, "losses")
+    broken = pl.col("reason").str.contains("^(error|refused): ")
+    console, found = Console(), comparisons(flown.filter(~broken))
     headings = ("experiment", "cell", "opponent", "figure", "QP worse by", "matters", "n")
-    lost = [each for each in found if each.lost]
+    lost = [each for each in found if each.outcome is Outcome.LOST]
     console.print(terminal_table(headings, [each.cells for each in lost], text=headings[:4]))
-    counts = Counter((each.opponent, "lost" if each.lost else "won" if each.won else "neither") for each in found)
-    rows = [
-        (name, *(str(counts[name, outcome]) for outcome in ("lost", "won", "neither")))
-        for name in sorted({each.opponent for each in found})
-    ]
-    console.print(terminal_table(("opponent", "QP lost", "QP won", "neither"), rows, text=("opponent",)))
+    counts = Counter((each.opponent, each.outcome) for each in found)
+    rows = [(name, *(str(counts[name, each]) for each in Outcome)) for name in sorted({name for name, _ in counts})]
+    console.print(terminal_table(("opponent", *(each.value for each in Outcome)), rows, text=("opponent",)))
+    errors = flown.filter(broken)
+    for row in errors.to_dicts():
+        words = f"{row['experiment']}, {row['law']}, {row['variant']}, seed {row['seed']}: {row['reason']}"
+        console.print(words, markup=False, highlight=False)
     console.print(
-        f"{len(lost)} of {len(found)} comparisons lost, goal: at most {MOST_LOST}; {len(table)} of {len(runs)} flights"
+        f"{len(lost)} of {len(found)} comparisons lost, goal: at most {MOST_LOST}; {len(flown)} of {len(runs)} flights"
     )
     if interrupted:
         return 130
-    return int(len(lost) > MOST_LOST or len(table) < len(runs))
+    return int(len(lost) > MOST_LOST or len(flown) < len(runs) or len(errors) > 0)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,15 @@ from sim.experiments.relevance import threshold
 from sim.experiments.spec import Column, experiment
 from sim.sweep.paired import differences, exact_interval
 from sim.sweep.statistics import needed, parameters, split
+
+
+class Outcome(Enum):
+    """Of a comparison."""
+
+    LOST = "QP lost"
+    WON = "QP won"
+    NEITHER = "neither"
+    FEW = "too few pairs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,14 +51,12 @@ class Comparison:
     pairs: int
 
     @property
-    def lost(self) -> bool:
-        """Whether the whole exact interval is worse than what matters."""
-        return self.pairs >= needed() and self.interval[0] > self.least
-
-    @property
-    def won(self) -> bool:
-        """Whether the whole exact interval is better than what matters."""
-        return self.pairs >= needed() and self.interval[1] < -self.least
+    def outcome(self) -> Outcome:
+        """Whether the whole exact interval is worse, or better, than what matters."""
+        if self.pairs < needed():
+            return Outcome.FEW
+        low, high = self.interval
+        return Outcome.LOST if low > self.least else Outcome.WON if high < -self.least else Outcome.NEITHER
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -72,6 +80,8 @@ def comparisons(table: pl.DataFrame) -> list[Comparison]:
             if law == "qp" and not str(variant).endswith("mpc"):
                 continue
             mine = rows.filter((pl.col("law") == "qp") & (pl.col("variant") == base))
+            if mine.is_empty():
+                continue
             name = str(variant) if law == "qp" else f"analytic law, {variant}"
             found += _against(key["experiment"], parameters(key), name, mine, theirs)
     return found

@@ -20,14 +20,14 @@ COMPARED = (
     "payload",
     "rotor-derate",
 )
-#: Experiments in which thrust limits are active, so that the allocator matters.
-LIMITED = ("gust", "saturation", "friction", "rotor-derate")
-#: Variants of the opponents by that of the QP. The analytic law clips in the first of them; ``sequential`` and ``box``
-#: are other allocators.
+#: Experiments in which thrust limits act, so that the allocator matters.
+LIMITED = ("gust", "rivals", "saturation", "friction", "rotor-derate")
+#: Variants of the opponents by that of the QP; the analytic law clips its thrusts.
 OPPONENTS = {
     "standard": ("shared-gains", "mpc"),
     "no-reach-check": ("no-reach-check-shared-gains", "no-reach-check-mpc"),
 }
+#: And with other allocators of the analytic law.
 ALLOCATORS = {
     "standard": ("sequential", "box"),
     "no-reach-check": ("no-reach-check-sequential", "no-reach-check-box"),

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from ibvs_qp.config import EstimationConfig
 from ibvs_qp.estimation.plane_acceleration import PlaneAcceleration
+from ibvs_qp.pilot import Pilot
+from sim.experiments.scenes import near_wall
+from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.surroundings import World
 
 TICK, NORMAL = 0.004, (1.0, 0.0, 0.0)
 HOVER = np.array([0.0, 0.0, -9.81])
@@ -96,6 +102,31 @@ def test_a_wind_that_leaps_is_motion_at_once(noise: float) -> None:
     errors, *_ = fly(wind=lambda time: 0.6 * (time > 5.0), noise=noise)
     velocity = TICK * errors[1250:, 1].cumsum()
     assert abs(velocity[:125]).max() < 0.03
+
+
+def test_the_pilot_integrates_the_force_by_model_and_accelerometer_with_its_noise() -> None:
+    """White noise of 1 m/s^2 a sample in calm air, from the second command on."""
+    options = FlightOptions(features="geometric", video=False)
+    scene = near_wall()
+    scene = dataclasses.replace(scene, imu=dataclasses.replace(scene.imu, accel_density=math.sqrt(TICK)))
+    config = pilot_config(scene, options)
+    pilot, world = Pilot(config), World(scene, options, config)
+    frames, predicted = [], []
+    predict = pilot.motion.predict
+
+    def seen(*given: Any) -> None:
+        predicted.append(given)
+        predict(*given)
+
+    pilot.motion.predict = seen  # type: ignore[method-assign]
+    for _ in range(750):
+        frames.append(world.sense())
+        world.act(pilot.step(frames[-1]).thrusts)
+    measured = np.array([frame.specific_force for frame in frames[250:]])
+    used = np.array([given[2] for given in predicted[250:]])
+    density = predicted[-1][-1]
+    assert measured[:, 1].std() > 0.9 and used[:, 1].std() < 0.5
+    assert density == pytest.approx(TICK, rel=0.5)
 
 
 def test_without_a_calm_change_the_accelerometer_alone_counts() -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from ibvs_qp.config import EstimationConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line, wall_line
-from ibvs_qp.estimation.wall_motion import ODOMETER, VELOCITY, TrackedLine, WallMotion
+from ibvs_qp.estimation.wall_motion import BIAS_STD, ODOMETER, VELOCITY, VELOCITY_STD, TrackedLine, WallMotion
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 
 VEHICLE = VehicleParams()
@@ -215,6 +215,29 @@ def test_a_track_that_jumps_is_refused_and_then_begun_anew() -> None:
             seen.append((k, stroke.motion.lines[1].offset))
     assert seen[0][1] == pytest.approx(before, abs=1e-3)  # one wild picture is not believed
     assert seen[-1][1] == pytest.approx(0.09, abs=1e-3)  # what stays is
+
+
+def test_a_noisier_force_gives_the_camera_more_weight() -> None:
+    axes = axes_of(Wall(LEVEL, 0.0))
+
+    def believed(density: float) -> float:
+        """Velocity after a second of hover, by a flow of 0.1 m/s to the right; before it one that weighs nothing."""
+        motion = WallMotion(TIP, CAMERA, TICK)
+        flow = 0.1 * np.array(axes.right)
+        for k in range(251):
+            stamp = (k + 1) * TICK_NS
+            motion.predict(stamp, axes, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0), TICK, density)
+            if k in (0, 250):
+                covariance = (0.01 if k else 1e6) * np.eye(3)
+                seen = FeatureFrame(lines=(), plane=None, stamp_ns=stamp, velocity=flow, velocity_covariance=covariance)
+                motion.correct(seen, axes, 0.0)
+        return motion.state[0]
+
+    variance = VELOCITY_STD**2 + BIAS_STD**2
+    for density in (0.0, 4e-3):
+        gain = (variance + density) / (variance + density + 0.01)
+        assert believed(density) == pytest.approx(0.1 * gain, rel=0.02)
+    assert believed(1e-6) == believed(0.0)  # the noise of the settings is the least
 
 
 def test_turning_moves_the_tip_and_not_the_lines() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import polars as pl
 import pytest
 
-from sim.experiments.losses.comparison import Comparison, comparisons
+from sim.experiments.losses.comparison import Comparison, Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
 
 CELL = {"experiment": "friction", "param.world": "ideal", "param.friction": 0.8}
@@ -55,19 +55,31 @@ def test_the_rival_flies_the_rival_and_the_reach_check_is_off_where_named() -> N
 
 def test_a_comparison_is_lost_when_the_whole_interval_is_worse_than_what_matters() -> None:
     least = compared(values=[0.1] * 10)["push error"].least
-    for better, lost in ((1.2 * least, True), (0.8 * least, False), (-2.0 * least, False)):
+    outcomes = ((1.2, Outcome.LOST), (0.8, Outcome.NEITHER), (-0.8, Outcome.NEITHER), (-1.2, Outcome.WON))
+    for factor, outcome in outcomes:
+        better = factor * least
         found = compared(values=[0.1 + 0.01 * seed - better for seed in range(10)])["push error"]
         assert found.worse == pytest.approx(better) and found.pairs == 10
-        assert found.lost is lost and found.won is (better < -least)
+        assert found.outcome is outcome
 
 
 def test_one_bad_seed_of_ten_decides_nothing() -> None:
     values = [0.1 + 0.01 * seed for seed in range(10)]
-    assert not compared(values=[values[0] - 5.0, *values[1:]])["push error"].lost
+    assert compared(values=[values[0] - 5.0, *values[1:]])["push error"].outcome is Outcome.NEITHER
 
 
-@pytest.mark.parametrize(("failed", "lost"), [(5, False), (6, True)])
-def test_flights_that_only_the_opponent_completes_are_lost(failed: int, lost: bool) -> None:
+def test_a_figure_of_which_more_is_better_is_worse_when_it_is_less() -> None:
+    """Contact of 90 % against 99 %: in the unit of the table."""
+    flights = [
+        rows(law, "standard", [0.1] * 10).with_columns(pl.lit(share).alias("contact_share"))
+        for law, share in (("qp", 0.90), ("paper", 0.99))
+    ]
+    found = {each.words: each for each in comparisons(pl.concat(flights))}["contact while painting, %"]
+    assert found.worse == pytest.approx(9.0) and found.outcome is Outcome.LOST
+
+
+@pytest.mark.parametrize(("failed", "outcome"), [(5, Outcome.FEW), (6, Outcome.LOST)])
+def test_flights_that_only_the_opponent_completes_are_lost(failed: int, outcome: Outcome) -> None:
     found = compared(values=[0.1] * 10, mine=[seed >= failed for seed in range(10)])
-    assert found["flights completed by one law alone"].lost is lost
+    assert found["flights completed by one law alone"].outcome is outcome
     assert found["flights completed by one law alone"].pairs == failed
