@@ -30,7 +30,7 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="+", help="fly only these kinds of flights")
     add_part_options(parser, "runs/law_goals")
     given = parse_part(parser)
-    runs = design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric"))
+    runs = design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric", compiled=True))
     wanted = [run for run in runs if not given.kinds or run.params["kind"] in given.kinds]
     table, interrupted = fly_part(runs, wanted, given, "goals of the law")
     before = pl.read_csv(HERE / "before.csv")

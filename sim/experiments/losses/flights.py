@@ -45,7 +45,7 @@ def runs_of(names: tuple[str, ...] = COMPARED) -> list[Run]:
     for name in names:
         spec = experiment(name)
         flights = tuple(each for flown in spec.flights for each in _with_opponents(flown, name in LIMITED))
-        found += design(dataclasses.replace(spec, flights=flights), Choice(features="geometric"))
+        found += design(dataclasses.replace(spec, flights=flights), Choice(features="geometric", compiled=True))
     return found
 
 
