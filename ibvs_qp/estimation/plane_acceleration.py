@@ -18,6 +18,8 @@ from ibvs_qp.symbolic.step_function import StepFunction
 NOISE_LOW, NOISE_HIGH = 60.0, 120.0
 #: Power of white noise of unit density [1/s] behind two poles at `NOISE_HIGH` and one zero and pole at `NOISE_LOW`.
 NOISE_POWER = NOISE_HIGH**3 / (4.0 * (NOISE_HIGH + NOISE_LOW) ** 2)
+#: Bandwidth of the rate of the contact force [rad/s], by which a late sample is led.
+CONTACT_CHANGE = 30.0
 #: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts.
 GUST_HIGH = 8.0
 #: A change of this many times the power of noise and calm air is a gust at once: noise alone has it once in 8000 ticks.
@@ -34,7 +36,15 @@ class PlaneForce(NamedTuple):
 
 
 def plane_force(
-    signals: Signals, config: EstimationConfig, *, dt: ca.SX, measured: ca.SX, explained: ca.SX, normal: ca.SX
+    signals: Signals,
+    config: EstimationConfig,
+    *,
+    dt: ca.SX,
+    measured: ca.SX,
+    motors: ca.SX,
+    contact: ca.SX,
+    delay_s: float,
+    normal: ca.SX,
 ) -> PlaneForce:
     r"""Specific force by motors' model and accelerometer, and its noise.
 
@@ -51,10 +61,16 @@ def plane_force(
         config: Averaging time of the noise, and the changes at which w is one half.
         dt: Time since the last tick [s].
         measured: Accelerometer f [m/s^2], (3,).
-        explained: Specific force by motors and contact at the last tick [m/s^2], (3,); zero before the first command.
+        motors: Specific force by the motors' model at the last tick [m/s^2], (3,); zero before the first command.
+        contact: Specific force by the measured contact [m/s^2], (3,).
+        delay_s: Age of that sample [s]. It is led by its rate: while a stuck tip is drawn, friction rises with the
+            thrust, and a late sample of it is a false acceleration.
         normal: Unit vector into the wall, in B, (3,).
     """
-    known = ca.sumsqr(explained) > 0.0
+    known = ca.sumsqr(motors) > 0.0
+    late = signals.state("plane.contact", 3)
+    late = signals.remember("plane.contact", late + filter_gain(CONTACT_CHANGE, dt) * (contact - late))
+    explained = motors + contact + delay_s * CONTACT_CHANGE * (contact - late)
     across = ca.SX.eye(3) - normal @ normal.T
     rest = where(known, across @ (measured - explained), 0.0)
     density = _noise_density(signals, across @ measured, dt, config.vibration_time_s)
@@ -99,17 +115,20 @@ class PlaneAcceleration:
 
     Args:
         config: Averaging time of the noise, and the changes at which w is one half.
+        delay_s: Age of a force sample [s].
         compiled: Whether it runs as machine code.
     """
 
-    def __init__(self, config: EstimationConfig, compiled: bool = False) -> None:
+    def __init__(self, config: EstimationConfig, delay_s: float, compiled: bool = False) -> None:
         signals = Signals()
         found = plane_force(
             signals,
             config,
             dt=signals.input("dt"),
             measured=signals.input("measured", 3),
-            explained=signals.input("explained", 3),
+            motors=signals.input("motors", 3),
+            contact=signals.input("contact", 3),
+            delay_s=delay_s,
             normal=signals.input("normal", 3),
         )
         signals.output("force", found.force)
@@ -123,11 +142,16 @@ class PlaneAcceleration:
         self.force, self.density = [0.0, 0.0, 0.0], 0.0
 
     def update(
-        self, dt: float, measured: Sequence[float], explained: Sequence[float], normal: Sequence[float]
+        self,
+        dt: float,
+        measured: Sequence[float],
+        motors: Sequence[float],
+        contact: Sequence[float],
+        normal: Sequence[float],
     ) -> list[float]:
         """Specific force of a tick; arguments as of `plane_force`."""
         self._step.advance()
-        self._step.values[:] = dt, *measured, *explained, *normal
+        self._step.values[:] = dt, *measured, *motors, *contact, *normal
         self._step.evaluate()
         *self.force, self.density = self._step.results.tolist()
         return self.force

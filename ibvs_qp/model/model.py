@@ -146,9 +146,9 @@ class Model:
         inertial_push(signals, config, self.effectiveness, body, contact, self._motors)
         carried_weight(signals, config, self.effectiveness, body, self._motors)
         missing_thrust(signals, config, self.effectiveness, body, felt_moment, self._motors)
-        explained = ca.DM(self.effectiveness[:3]) @ self._motors.thrusts + body.wrench[:3]
-        self.output("explained_force", explained / vehicle.mass_kg)
-        self.output("modelled_force", (explained + external[:3]) / vehicle.mass_kg)
+        motors = ca.DM(self.effectiveness[:3]) @ self._motors.thrusts
+        self.output("motors_force", motors / vehicle.mass_kg)
+        self.output("modelled_force", (motors + body.wrench[:3] + external[:3]) / vehicle.mass_kg)
         gyroscopic = -ca.cross(body.rate, ca.sparsify(vehicle.inertia) @ body.rate)
         # The observer takes the accelerometer's bias for a force, and gravity leaks through the attitude's error.
         bias = contact.bias * normal + along - normal * ca.dot(normal, along)

@@ -229,9 +229,9 @@ class Setpoints:
         return self.step.outputs["modelled_force"].tolist()
 
     @property
-    def explained_force(self) -> list[float]:
-        """Specific force by the motors' model and the measured contact at the last step [m/s^2], (3,)."""
-        return self.step.outputs["explained_force"].tolist()
+    def motors_force(self) -> list[float]:
+        """Specific force by the motors' model at the last step [m/s^2], (3,)."""
+        return self.step.outputs["motors_force"].tolist()
 
     @property
     def motor_thrusts(self) -> np.ndarray:

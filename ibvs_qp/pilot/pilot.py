@@ -124,7 +124,9 @@ class Pilot:
         self.tare = WrenchTare(vehicle, self.config.estimation)
         self.contact = ContactEstimator(settings)
         self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self._plane_acceleration = PlaneAcceleration(self.config.estimation, settings.compiled)
+        self._plane_acceleration = PlaneAcceleration(
+            self.config.estimation, settings.brush.force_delay_s, settings.compiled
+        )
         self._history = AttitudeHistory(self.motion.ticks)
         self._camera = CameraInput(self.config, self._history, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
@@ -292,7 +294,8 @@ class Pilot:
         self._check_axes(frame, contact, dt)
         axes = WallAxes.of(contact.normal, down)
         plane = self._plane_acceleration
-        plane.update(dt, force, self.setpoints.explained_force, contact.normal)
+        felt = (wrench[:3] / self.config.controller.vehicle.mass_kg).tolist()
+        plane.update(dt, force, self.setpoints.motors_force, felt, contact.normal)
         self.motion.predict(stamp, axes, plane.force, rate, dt, plane.density)
         self._history.remember(attitude, rate, dt)
         if features is not None:

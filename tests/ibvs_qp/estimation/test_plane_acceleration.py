@@ -17,7 +17,7 @@ from sim.experiments.scenes import near_wall
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 
-TICK, NORMAL = 0.004, (1.0, 0.0, 0.0)
+TICK, DELAY, NORMAL, FREE = 0.004, 0.009, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 HOVER = np.array([0.0, 0.0, -9.81])
 
 
@@ -32,21 +32,21 @@ def fly(
     Returns:
         Estimate less truth, in B [m/s^2], (n, 3), the truth (n, 3), and the noise found [m^2/s^3].
     """
-    estimator, rng = PlaneAcceleration(config or EstimationConfig()), np.random.default_rng(0)
+    estimator, rng = PlaneAcceleration(config or EstimationConfig(), DELAY), np.random.default_rng(0)
     truths, errors, densities = [], [], []
     for tick in range(round(seconds / TICK)):
         truth = HOVER + np.array((0.0, wind(tick * TICK), 0.0))
         measured = truth + noise * rng.standard_normal(3)
-        errors.append(np.array(estimator.update(TICK, measured, HOVER, NORMAL)) - truth)
+        errors.append(np.array(estimator.update(TICK, measured, HOVER, FREE, NORMAL)) - truth)
         truths.append(truth)
         densities.append(estimator.density)
     return np.array(errors), np.array(truths), densities
 
 
 def test_the_accelerometer_alone_counts_before_the_first_command() -> None:
-    estimator = PlaneAcceleration(EstimationConfig())
+    estimator = PlaneAcceleration(EstimationConfig(), DELAY)
     for measured in ([0.3, -0.2, -9.7], [0.1, 0.4, -9.9]):
-        assert estimator.update(TICK, measured, (0.0, 0.0, 0.0), NORMAL) == pytest.approx(measured)
+        assert estimator.update(TICK, measured, FREE, FREE, NORMAL) == pytest.approx(measured)
 
 
 @pytest.mark.parametrize("noise", [0.06, 1.0, 2.0])
@@ -73,21 +73,33 @@ def test_gusts_are_motion(noise: float) -> None:
 @pytest.mark.parametrize("seconds", [0.2, 1.0])
 def test_an_error_of_the_motors_model_is_no_noise_and_no_motion(seconds: float) -> None:
     """The model errs by 0.5 m/s^2 with this period while the vehicle hovers: rotors slower than assumed."""
-    estimator, rng, errors = PlaneAcceleration(EstimationConfig()), np.random.default_rng(0), []
+    estimator, rng, errors = PlaneAcceleration(EstimationConfig(), DELAY), np.random.default_rng(0), []
     for tick in range(5000):
-        explained = HOVER + np.array((0.0, 0.5 * math.sin(2.0 * math.pi * tick * TICK / seconds), 0.0))
+        motors = HOVER + np.array((0.0, 0.5 * math.sin(2.0 * math.pi * tick * TICK / seconds), 0.0))
         measured = HOVER + 0.06 * rng.standard_normal(3)
-        errors.append(estimator.update(TICK, measured, explained, NORMAL)[1] - measured[1])
+        errors.append(estimator.update(TICK, measured, motors, FREE, NORMAL)[1] - measured[1])
     assert np.std(errors[1000:]) < 0.15 * 0.5 / math.sqrt(2.0)
     assert estimator.density < 3.0 * 0.06**2 * TICK
 
 
+def test_friction_that_rises_with_the_thrust_is_no_motion() -> None:
+    """A stuck tip, drawn by 10 N/s on 6 kg; the force sample is one delay old, and the motors' force half a tick."""
+    estimator, rate = PlaneAcceleration(EstimationConfig(), DELAY), 10.0 / 6.0
+    velocity = 0.0
+    for tick in range(250):
+        time = tick * TICK
+        motors = HOVER + np.array((0.0, rate * time, 0.0))
+        contact = (0.0, -rate * max(time - DELAY, 0.0), 0.0)
+        velocity += TICK * estimator.update(TICK, HOVER, motors, contact, NORMAL)[1]
+    assert abs(velocity) < 0.003  # 0.015 m/s without the lead
+
+
 def test_a_spike_of_the_force_sensor_leaves_the_noise() -> None:
     """150 N for 10 ms in the wall plane."""
-    estimator, rng = PlaneAcceleration(EstimationConfig()), np.random.default_rng(0)
+    estimator, rng = PlaneAcceleration(EstimationConfig(), DELAY), np.random.default_rng(0)
     for tick in range(2500):
-        explained = HOVER + np.array((0.0, 25.0 * (2000 <= tick < 2003), 0.0))
-        force = estimator.update(TICK, HOVER + 0.06 * rng.standard_normal(3), explained, NORMAL)
+        contact = (0.0, 25.0 * (2000 <= tick < 2003), 0.0)
+        force = estimator.update(TICK, HOVER + 0.06 * rng.standard_normal(3), HOVER, contact, NORMAL)
     assert abs(force[1]) < 0.3 and estimator.density < 2.0 * 0.06**2 * TICK
 
 
@@ -135,7 +147,7 @@ def test_without_a_calm_change_the_accelerometer_alone_counts() -> None:
 
 
 def test_reset_forgets() -> None:
-    estimator = PlaneAcceleration(EstimationConfig())
-    first = [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, NORMAL) for tick in range(50)]
+    estimator = PlaneAcceleration(EstimationConfig(), DELAY)
+    first = [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, FREE, NORMAL) for tick in range(50)]
     estimator.reset()
-    assert first == [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, NORMAL) for tick in range(50)]
+    assert first == [estimator.update(TICK, (0.0, 0.1 * tick, -9.81), HOVER, FREE, NORMAL) for tick in range(50)]
