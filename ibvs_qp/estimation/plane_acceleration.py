@@ -63,14 +63,14 @@ def plane_force(
         measured: Accelerometer f [m/s^2], (3,).
         motors: Specific force by the motors' model at the last tick [m/s^2], (3,); zero before the first command.
         contact: Specific force by the measured contact [m/s^2], (3,).
-        delay_s: Age of that sample [s]. It is led by its rate: while a stuck tip is drawn, friction rises with the
-            thrust, and a late sample of it is a false acceleration.
+        delay_s: Age of that sample [s]. It is led by its rate to the time of the motors' force, a tick ago: while a
+            stuck tip is drawn, friction rises with the thrust, and a later sample of it is a false acceleration.
         normal: Unit vector into the wall, in B, (3,).
     """
     known = ca.sumsqr(motors) > 0.0
     late = signals.state("plane.contact", 3)
     late = signals.remember("plane.contact", late + filter_gain(CONTACT_CHANGE, dt) * (contact - late))
-    explained = motors + contact + delay_s * CONTACT_CHANGE * (contact - late)
+    explained = motors + contact + ca.fmax(delay_s - dt, 0.0) * CONTACT_CHANGE * (contact - late)
     across = ca.SX.eye(3) - normal @ normal.T
     rest = where(known, across @ (measured - explained), 0.0)
     density = _noise_density(signals, across @ measured, dt, config.vibration_time_s)

@@ -114,7 +114,7 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
     # The ringing itself counts as gusts in part.
     nearest = min(margins, key=lambda margin: abs(margin.least_damping_ratio - ratio))
     assert ratio == pytest.approx(nearest.least_damping_ratio, abs=0.07)
-    assert frequency == pytest.approx(nearest.frequency_hz, rel=0.07)
+    assert frequency == pytest.approx(nearest.frequency_hz, rel=0.09)
     assert min(margin.least_damping_ratio for margin in margins) <= ratio + 0.07, "the flight has less than promised"
 
 
@@ -131,10 +131,10 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
 def test_holds_where_a_margin_is_and_oscillates_where_none_is(stiffness: float, latency: float, gains: dict) -> None:
     config, believed, push = pushed(stiffness, latency, 6.5, **gains)
     margin = contact_mode_damping(config, stiffness, 30.0, latency + HALF_SAMPLE, believed=believed)
-    last = push[-250:]
+    last = push[-500:]
     if margin.least_damping_ratio >= LEAST_DAMPING_RATIO:
         assert last.std() <= 0.15
-    else:
+    else:  # in the end it may throw the tip off the wall
         assert margin.least_damping_ratio < -0.04
         assert last.std() >= 0.5
 
