@@ -49,17 +49,12 @@ class Weights:
         1e-3,
         "thrust away from the last one",
         unit="1/N^2",
-        why="30 N: costs the push less than 0.004 N rms",
+        why="30 N: costs the push 0.004 N rms together with smoothness",
         low=1e-9,
         high=1e3,
     )
     smoothness: float = setting(
-        0.1,
-        "change of the thrust step",
-        unit="1/N^2",
-        why="3 N: the thrust rate in painting falls by a tenth, push and path stay",
-        low=0.0,
-        high=1e3,
+        1e-3, "change of the thrust step", unit="1/N^2", why="30 N, as the effort row", low=0.0, high=1e3
     )
     line_sigma: float = setting(2e-2, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
 

@@ -9,7 +9,7 @@ import casadi as ca
 
 from ibvs_qp.config import EstimationConfig
 from ibvs_qp.estimation.push_disturbance import SLOW_CHANGE, filter_gain, gust_weight
-from ibvs_qp.symbolic.logic import where
+from ibvs_qp.symbolic.logic import both, where
 from ibvs_qp.symbolic.signals import Signals
 from ibvs_qp.symbolic.step_function import StepFunction
 
@@ -45,6 +45,7 @@ def plane_force(
     contact: ca.SX,
     delay_s: float,
     normal: ca.SX,
+    seen: ca.SX,
 ) -> PlaneForce:
     r"""Specific force by motors' model and accelerometer, and its noise.
 
@@ -66,6 +67,8 @@ def plane_force(
         delay_s: Age of that sample [s]. It is led by its rate to the time of the motors' force, a tick ago: while a
             stuck tip is drawn, friction rises with the thrust, and a later sample of it is a false acceleration.
         normal: Unit vector into the wall, in B, (3,).
+        seen: Whether the tip presses, and the camera corrects the velocity. Otherwise the accelerometer alone counts:
+            a vehicle that flies blind drifts by the difference of its bias to that of the model.
     """
     known = ca.sumsqr(motors) > 0.0
     late = signals.state("plane.contact", 3)
@@ -77,7 +80,10 @@ def plane_force(
 
     fast, slow = signals.state("plane.fast", 3), signals.state("plane.slow", 3)
     fast = signals.remember("plane.fast", fast + filter_gain(GUST_HIGH, dt) * (rest - fast))
-    slow = signals.remember("plane.slow", slow + filter_gain(SLOW_CHANGE, dt) * (fast - slow))
+    time = signals.remember("plane.time", signals.state("plane.time") + where(known, dt, 0.0))
+    # At first the mean: the bias of the motion filter is that of this force, and the accelerometer takes over.
+    gain = ca.fmax(filter_gain(SLOW_CHANGE, dt), dt / ca.fmax(time, dt))
+    slow = signals.remember("plane.slow", slow + gain * (rest - slow))
     changed = ca.sumsqr(fast - slow) / 2.0
     gust: ca.SX | float = 1.0
     if config.calm_change:
@@ -87,7 +93,7 @@ def plane_force(
         leap = ca.fmax(changed - LEAP_POWERS * least, 0.0)
         gust = ca.fmax(gust, leap / (leap + least))
     calm = explained + slow
-    return PlaneForce(where(known, calm + gust * (measured - calm), measured), density)
+    return PlaneForce(where(both(known, seen), calm + gust * (measured - calm), measured), density)
 
 
 def _noise_density(signals: Signals, across: ca.SX, dt: ca.SX, time_s: float) -> ca.SX:
@@ -130,6 +136,7 @@ class PlaneAcceleration:
             contact=signals.input("contact", 3),
             delay_s=delay_s,
             normal=signals.input("normal", 3),
+            seen=signals.input("seen"),
         )
         signals.output("force", found.force)
         signals.output("density", found.density)
@@ -148,10 +155,11 @@ class PlaneAcceleration:
         motors: Sequence[float],
         contact: Sequence[float],
         normal: Sequence[float],
+        seen: bool,
     ) -> list[float]:
         """Specific force of a tick; arguments as of `plane_force`."""
         self._step.advance()
-        self._step.values[:] = dt, *measured, *motors, *contact, *normal
+        self._step.values[:] = dt, *measured, *motors, *contact, *normal, seen
         self._step.evaluate()
         *self.force, self.density = self._step.results.tolist()
         return self.force

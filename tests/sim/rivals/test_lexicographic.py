@@ -14,7 +14,7 @@ from ibvs_qp.controller import HybridController
 from sim.rivals.lexicographic import LexicographicController
 from sim.rivals.priorities import LEVELS, row_levels
 
-#: Barriers off: the levels then compete within the thrust window alone. With the shipped smoothness the thrusts of the
+#: Barriers off: the levels then compete within the thrust window alone. With a smoothness of 0.1 the thrusts of the
 #: weighted program lag by 0.4 N in such steps.
 FREE = ControllerConfig(barriers=False, weights=Weights(smoothness=1e-3))
 #: Thrusts that limit only some draws, and thrusts that limit many [N].
