@@ -31,7 +31,7 @@ from ibvs_qp.model.rows import Parameter, TaskRow
 from ibvs_qp.qp.accept import QpEngine
 from ibvs_qp.qp.evaluator import RecordedProgram
 from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.tasks import EffortTask, Task
+from ibvs_qp.tasks import EffortTask, SmoothnessTask, Task
 
 #: Half widths of the uniform demands about hover: lateral, vertical, roll and pitch, yaw [N, N m].
 LATERAL, VERTICAL, TIP_OVER, TURN = 40.0, 15.0, 3.0, 4.0
@@ -93,8 +93,7 @@ class ProgramAllocation:
 
     def __init__(self, height_weight: float | None = None) -> None:
         weight = CONFIG.weights.height if height_weight is None else height_weight
-        # Without smoothness: a demand has nothing to do with the last one.
-        tasks = [DemandedWrench(weight), EffortTask()]
+        tasks = [DemandedWrench(weight), EffortTask(), SmoothnessTask()]
         problem = QpProblem(Model(CONFIG), tasks, [ThrustLimit()])
         self._program = RecordedProgram(problem)
         self._engine = QpEngine(problem, CONFIG.solver, self._program)

@@ -15,7 +15,7 @@ from ibvs_qp.tasks import Task
 class QuietRotors(Task):
     """Thrusts of named rotors stay near a target."""
 
-    def __init__(self, *names: str, weight: float = 1.0) -> None:
+    def __init__(self, *names: str, weight: float = 0.1) -> None:
         self.names = names
         self._thrust, self._weight = Parameter("quiet_thrust", 0.0), Parameter("quiet_weight", weight)
 
@@ -61,6 +61,6 @@ quiet = QuietRotors("r0", "r7")
 for words, tasks in (("as shipped", []), ("quiet rotors", [quiet])):
     controller = HybridController(CONFIG, tasks=tasks)
     if tasks:
-        quiet.set_target(4.0)  # at the default weight of 1 / (1 N)^2: 1 N of error costs as much as 1.4 N of push
+        quiet.set_target(4.0)  # at the default weight of 1 / (3 N)^2: 3 N of error cost as much as 1.3 N of push
     command = controller.step(HOVER, Reference(standoff=0.3))
     print(f"{words:12s}  thrusts {np.round(command.thrusts, 1).tolist()} N, {command.outcome}")

@@ -34,7 +34,7 @@ class Comparison:
         experiment: Name.
         params: Parameters of the cell.
         opponent: Law and variant.
-        words: Figure and unit; "completed" for the flights that end as planned.
+        words: Figure and unit, or the flights that only one law completes.
         worse: Median of how much worse the QP is, in that unit.
         interval: Its exact interval.
         least: Least difference that matters.

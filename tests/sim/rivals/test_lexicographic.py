@@ -9,14 +9,13 @@ import pytest
 from controller_scenes import FLOOR, random_tick
 from scipy.optimize import lsq_linear
 
-from ibvs_qp.config import ControllerConfig, Weights
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from sim.rivals.lexicographic import LexicographicController
 from sim.rivals.priorities import LEVELS, row_levels
 
-#: Barriers off: the levels then compete within the thrust window alone. With a smoothness of 0.1 the thrusts of the
-#: weighted program lag by 0.4 N in such steps.
-FREE = ControllerConfig(barriers=False, weights=Weights(smoothness=1e-3))
+#: Barriers off: the levels then compete within the thrust window alone.
+FREE = dataclasses.replace(ControllerConfig(), barriers=False)
 #: Thrusts that limit only some draws, and thrusts that limit many [N].
 WIDE, NARROW = (FLOOR, 52.0), (9.0, 12.0)
 #: Draws whose two ticks stay within `WIDE`: the row filters carry the thrusts of a limited first tick into the second.
