@@ -126,8 +126,8 @@ def test_a_picture_has_the_style_and_the_description_of_its_figure():
 
 
 def test_force_ceiling_halves_the_peak_of_a_bad_force_law():
-    """Measured: 15.5 N without the ceiling, 7.2 N with it."""
-    bad = {"gains.force_kfp": 2.1, "gains.force_ksd": 0.0, "touch_ramp": False, "limits.push_barrier": False}
+    """Measured: 15.6 N without the ceiling, 6.4 N with it; a bouncing flight differs by 2 N between processors."""
+    bad = {"gains.force_kfp": 4.0, "gains.force_ksd": 0.0, "touch_ramp": False, "limits.push_barrier": False}
     bench = TuningBench()
     values = {f"pilot.controller.{name}": value for name, value in bad.items()}
     without = flight_figures(bench.compare(values).now)["greatest push [N]"]
