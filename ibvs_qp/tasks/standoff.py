@@ -17,7 +17,7 @@ TOUCH_FORCE_BUDGET = 2.9
 SLOWING = 1.5
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
-#: With a rotor lost: weight over that of a level vehicle [-]: far below the moments, above effort and smoothness.
+#: With a rotor lost: weight over that of a level vehicle [-]: far below the moments.
 LOST_WEIGHT = 0.1
 #: Likewise: speed away from the wall [m/s], speed error to acceleration [1/s], and its bound [m/s^2].
 LOST_SPEED, LOST_GAIN, LOST_BOUND = 0.4, 3.0, 3.0
