@@ -49,7 +49,7 @@ class Weights:
         0.1,
         "thrust away from the last one",
         unit="1/N^2",
-        why="3 N: a rotor follows noise of the sensors 12 % more slowly; 0.2 costs a slide at the limits 0.05 N of push",
+        why="3 N: noise of the sensors moves the rotors 12 % more slowly, path and slides are as with 30 N",
         low=1e-9,
         high=1e3,
     )

@@ -45,7 +45,7 @@ def plane_force(
     contact: ca.SX,
     delay_s: float,
     normal: ca.SX,
-    seen: ca.SX,
+    use_model: ca.SX,
 ) -> PlaneForce:
     r"""Specific force by motors' model and accelerometer, and its noise.
 
@@ -67,8 +67,8 @@ def plane_force(
         delay_s: Age of that sample [s]. It is led by its rate to the time of the motors' force, a tick ago: while a
             stuck tip is drawn, friction rises with the thrust, and a later sample of it is a false acceleration.
         normal: Unit vector into the wall, in B, (3,).
-        seen: Whether the tip presses, and the camera corrects the velocity. Otherwise the accelerometer alone counts:
-            a vehicle that flies blind drifts by the difference of its bias to that of the model.
+        use_model: Whether the tip presses, and the camera corrects the velocity. Otherwise the accelerometer alone
+            counts: a vehicle that flies blind drifts by the difference of its bias to that of the model.
     """
     known = ca.sumsqr(motors) > 0.0
     late = signals.state("plane.contact", 3)
@@ -93,7 +93,7 @@ def plane_force(
         leap = ca.fmax(changed - LEAP_POWERS * least, 0.0)
         gust = ca.fmax(gust, leap / (leap + least))
     calm = explained + slow
-    return PlaneForce(where(both(known, seen), calm + gust * (measured - calm), measured), density)
+    return PlaneForce(where(both(known, use_model), calm + gust * (measured - calm), measured), density)
 
 
 def _noise_density(signals: Signals, across: ca.SX, dt: ca.SX, time_s: float) -> ca.SX:
@@ -136,7 +136,7 @@ class PlaneAcceleration:
             contact=signals.input("contact", 3),
             delay_s=delay_s,
             normal=signals.input("normal", 3),
-            seen=signals.input("seen"),
+            use_model=signals.input("use_model"),
         )
         signals.output("force", found.force)
         signals.output("density", found.density)
@@ -155,11 +155,11 @@ class PlaneAcceleration:
         motors: Sequence[float],
         contact: Sequence[float],
         normal: Sequence[float],
-        seen: bool,
+        use_model: bool,
     ) -> list[float]:
         """Specific force of a tick; arguments as of `plane_force`."""
         self._step.advance()
-        self._step.values[:] = dt, *measured, *motors, *contact, *normal, seen
+        self._step.values[:] = dt, *measured, *motors, *contact, *normal, use_model
         self._step.evaluate()
         *self.force, self.density = self._step.results.tolist()
         return self.force

@@ -295,8 +295,8 @@ class Pilot:
         axes = WallAxes.of(contact.normal, down)
         plane = self._plane_acceleration
         felt = (wrench[:3] / self.config.controller.vehicle.mass_kg).tolist()
-        seen = contact.in_contact and self.motion.velocity_age_s < self.config.estimation.velocity_life_s
-        plane.update(dt, force, self.setpoints.motors_force, felt, contact.normal, seen)
+        use_model = contact.in_contact and self.motion.velocity_age_s < self.config.estimation.velocity_life_s
+        plane.update(dt, force, self.setpoints.motors_force, felt, contact.normal, use_model)
         self.motion.predict(stamp, axes, plane.force, rate, dt, plane.density)
         self._history.remember(attitude, rate, dt)
         if features is not None:

@@ -139,11 +139,11 @@ def test_the_pilot_integrates_the_force_by_model_and_accelerometer_with_its_nois
     frames, predicted = [], []
     predict = pilot.motion.predict
 
-    def seen(*given: Any) -> None:
+    def noted(*given: Any) -> None:
         predicted.append(given)
         predict(*given)
 
-    pilot.motion.predict = seen  # type: ignore[method-assign]
+    pilot.motion.predict = noted  # type: ignore[method-assign]
     pressed = 0
     while pressed < 500:
         frames.append(world.sense())
