@@ -19,7 +19,7 @@ class AngularRateSettings:
         high=1000.0,
     )
     attitude_bandwidth_hz: float = setting(
-        4.0,
+        8.0,
         "roll and pitch of the attitude estimate count below, the angular velocity above; 1000 takes them as they are",
         unit="Hz",
         low=0.5,

@@ -43,23 +43,18 @@ class Weights:
         1.6e3, "height row", "s^4/m^2", "0.025 m/s^2 = 0.15 N: an unreachable push must not lift the vehicle"
     )
     margin: float = _weight(
-        1.0, "redundant thrusts, of more than six rotors", "1/N^2", "1 N: above effort; no task moves these thrusts"
+        0.01, "redundant thrusts, of more than six rotors", "1/N^2", "10 N: above effort, below every task"
     )
     effort: float = setting(
-        0.1,
+        1e-3,
         "thrust away from the last one",
         unit="1/N^2",
-        why="3 N: noise of the sensors moves the rotors 12 % more slowly, path and slides are as with 30 N",
+        why="30 N: costs the push 0.004 N rms together with smoothness",
         low=1e-9,
         high=1e3,
     )
     smoothness: float = setting(
-        1e-3,
-        "change of the thrust step",
-        unit="1/N^2",
-        why="30 N: above the effort row, thrusts that no task moves would keep their rate",
-        low=0.0,
-        high=1e3,
+        1e-3, "change of the thrust step", unit="1/N^2", why="30 N, as the effort row", low=0.0, high=1e3
     )
     line_sigma: float = setting(2e-2, "line deviation at which a row's weight halves", low=1e-6, high=1.0)
 

@@ -17,7 +17,7 @@ TOUCH_FORCE_BUDGET = 2.9
 SLOWING = 1.5
 #: Integral gain of the approach speed at the wall [1/s^2] and bound of its force [N].
 SEARCH_GAIN, SEARCH_BOUND = 6.0, 6.0
-#: With a rotor lost: weight over that of a level vehicle [-]: far below the moments.
+#: With a rotor lost: weight over that of a level vehicle [-]: far below the moments, above effort and smoothness.
 LOST_WEIGHT = 0.1
 #: Likewise: speed away from the wall [m/s], speed error to acceleration [1/s], and its bound [m/s^2].
 LOST_SPEED, LOST_GAIN, LOST_BOUND = 0.4, 3.0, 3.0
@@ -44,6 +44,8 @@ class StandoffTask(Task):
     r"""Net force along n equals mass times the target approach acceleration [N], weight 1 - lambda.
 
     .. math:: F = m K_d (v - (-\dot e_s)) + F_{search}, \quad v = \min(K_p (e_s - e_{ref}), v_{max}(e_s))
+
+    `Model.filtered` follows with the filter of the push row: both act along n, and damping passes noise on to the rotors.
     """
 
     weight_settings = ("weights.push",)
@@ -67,7 +69,8 @@ class StandoffTask(Task):
         gains, settings, motion = model.gains, model.config.contact, approach(model)
         landing = ca.logic_and(model.target.press, model.contact.distance < settings.touch_distance_m)
         damping = model.config.vehicle.mass_kg * ca.if_else(landing, settings.landing_kd, gains.standoff_kd)
-        return ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
+        force = ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
+        return model.filtered(force, model.force_along_normal, gains.push_filter_s)
 
 
 def _lost_force(model: Model) -> ca.SX:
