@@ -182,6 +182,21 @@ def test_height_row_asks_for_nothing_new_where_nothing_is_limited(lines: int) ->
         np.testing.assert_allclose(thrusts[0], thrusts[1], atol=0.06)  # of 27 N
 
 
+def test_the_force_to_the_stand_off_is_filtered_as_the_push() -> None:
+    """The first tick moves the force along n by the share of the filter from that of the last thrusts, here none."""
+    wall, config = Wall(np.array([1.0, 0.0, 0.0, 0.0]), 0.6), ControllerConfig()
+    asked = []
+    for filter_s in (0.0, 0.02):
+        gains = dataclasses.replace(config.gains, push_filter_s=filter_s)
+        controller = HybridController(dataclasses.replace(config, gains=gains))
+        pack(controller, measured(0, plane=wall.plane), Reference())
+        last = accelerations(controller, controller.setpoints.step.inputs["thrust_last"])
+        before = float(controller.setpoints.normal @ last[:3]) * config.vehicle.mass_kg
+        asked.append(rows(controller, np.full(6, 11.0))["standoff"][1] - before)
+    assert abs(asked[0]) > 1.0
+    assert asked[1] == pytest.approx((1.0 - math.exp(-config.tick_s / 0.02)) * asked[0], abs=1e-9)
+
+
 def test_signs_of_the_wishes(controller: HybridController) -> None:
     """A vehicle that rolls right, noses up, faces left of the wall or drifts right is asked to undo just that."""
     reference = Reference(lines=line_references(2))
