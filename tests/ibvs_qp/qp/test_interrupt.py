@@ -32,8 +32,8 @@ os._exit(0)
 #: Signals that may be lost: one that arrives during the last iteration of a solve, after OSQP's last look at it. One
 #: that was not answered for so long is lost [s].
 LOST, PATIENCE_S = 3, 2.0
-#: Until the process is in OSQP, where it spends 97 % of its time [s].
-SOLVING_S = 0.02
+#: Until the process is in OSQP, where it spends 97 % of its time, on a loaded machine as well [s].
+SOLVING_S = 0.1
 
 
 def test_ctrl_c_during_a_solve_arrives() -> None:
