@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-#: Turns are compared over this time [s], and judged once the gyro's of an axis have this root sum of squares [rad]:
-#: ten times the noise of a turn by two attitudes.
-TURN_TIME, LEAST_TURN = 0.25, math.radians(0.7)
+#: Turns are compared over this time [s], and judged once the gyro's of an axis have this root sum of squares [rad], and
+#: this multiple of the noise of a turn by two attitudes: the correlation's deviation is then 0.2.
+TURN_TIME, LEAST_TURN, LEAST_RATIO = 0.25, math.radians(0.7), 5.0
+#: Turns after which that noise is known.
+LEAST_TURNS = 4
 #: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 with a wrong sign.
 OPPOSED = -0.5
 #: A turn of the attitude counts up to this multiple of the gyro's: yaw is arbitrary and may leap.
 LARGEST_RATIO = 2.0
+#: A larger difference of both turns counts as this for the noise [rad]: a leap of yaw.
+LARGEST_NOISE = math.radians(3.0)
 
 
 class TurnCheck:
@@ -26,6 +30,7 @@ class TurnCheck:
         self._start: Sequence[float] | None = None
         self._time, self._turn = 0.0, [0.0, 0.0, 0.0]
         self._square, self._product, self._opposed = [0.0] * 3, [0.0] * 3, [False] * 3
+        self._turns, self._same_sign, self._other_sign = 0, [0.0] * 3, [0.0] * 3
 
     def add(self, attitude: Sequence[float], rate: Sequence[float], dt: float) -> None:
         """Add a tick: quaternion B in I, gyro [rad/s], time since the last tick [s]."""
@@ -36,16 +41,26 @@ class TurnCheck:
         self._turn = [turn + dt * entry for turn, entry in zip(self._turn, rate, strict=True)]
         if self._time < TURN_TIME:
             return
-        for axis, (seen, felt) in enumerate(zip(turned(self._start, attitude), self._turn, strict=True)):
+        turns = list(zip(turned(self._start, attitude), self._turn, strict=True))
+        noise = self._noise(turns)
+        for axis, (seen, felt) in enumerate(turns):
             largest = LARGEST_RATIO * abs(felt)
             self._square[axis] += felt * felt
             self._product[axis] += felt * min(max(seen, -largest), largest)
-            if self._square[axis] >= LEAST_TURN**2:
+            if self._turns >= LEAST_TURNS and self._square[axis] >= max(LEAST_TURN**2, LEAST_RATIO**2 * noise):
                 self._opposed[axis] = self._product[axis] < OPPOSED * self._square[axis]
                 self._square[axis] = self._product[axis] = 0.0
         self._start, self._time, self._turn = attitude, 0.0, [0.0, 0.0, 0.0]
         axes = " and ".join([name for name, opposed in zip("xyz", self._opposed, strict=True) if opposed])
         self.faults = (f"attitude: turns against the gyro about {axes}; one of both is FLU, not FRD",) if axes else ()
+
+    def _noise(self, turns: Sequence[tuple[float, float]]) -> float:
+        """Largest mean square of an axis that no sign explains, with the turns of attitude and gyro added [rad^2]."""
+        self._turns += 1
+        for axis, (seen, felt) in enumerate(turns):
+            self._same_sign[axis] += min(abs(seen - felt), LARGEST_NOISE) ** 2
+            self._other_sign[axis] += min(abs(seen + felt), LARGEST_NOISE) ** 2
+        return max(map(min, self._same_sign, self._other_sign)) / self._turns
 
 
 def turned(start: Sequence[float], end: Sequence[float]) -> tuple[float, float, float]:

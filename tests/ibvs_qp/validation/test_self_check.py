@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ibvs_qp.validation.self_check import SelfCheck
+from ibvs_qp.validation.turn_check import TurnCheck
 
 DT = 0.004
 #: From front-left-up to front-right-down and back, and from NED to ENU.
@@ -114,6 +115,20 @@ def test_a_gyro_bias_and_leaps_of_yaw_are_no_wrong_axes(bias: float) -> None:
         attitude = Rotation.from_rotvec([0.0, 0.0, yaw]) * Rotation.from_rotvec(rng.normal(0.0, 1e-3, 3))
         check.inertial(*sensed(attitude, rng.normal(bias, 5e-3, 3)), DT)
         assert check.faults() == ()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_noisy_attitude_is_not_in_other_axes(seed: int) -> None:
+    """0.5 degrees a sample; every second the vehicle turns by a degree in a quarter of a second, there or back."""
+    check, rng = TurnCheck(), np.random.default_rng(seed)
+    for tick in range(15_000):
+        second, share = divmod(tick * DT, 1.0)
+        done, back = min(4.0 * share, 1.0), second % 2
+        angle = math.radians(1.0 - done if back else done) * np.ones(3)
+        rate = math.radians(-4.0 if back else 4.0) * (share < 0.25) * np.ones(3)
+        noisy = Rotation.from_rotvec(angle) * Rotation.from_rotvec(rng.normal(0.0, math.radians(0.5), 3))
+        check.add(quaternion(noisy), (rate + rng.normal(0.0, 5e-3, 3)).tolist(), DT)
+        assert check.faults == ()
 
 
 def test_an_accelerated_or_turning_vehicle_has_not_passed_yet() -> None:
