@@ -66,7 +66,7 @@ class ContactSettings:
     friction_gain: float = setting(
         0.92,
         "gain of the friction along the travel in the feed-forward",
-        why="the velocity integral learns the rest: with 0.9 a slide at friction 0.8 is 4 % slow, with 1 8 % off",
+        why="the velocity integral learns the rest: with 0.9 a slide at friction 0.8 is 4 % slow or 2 % fast",
         low=0.0,
         high=1.0,
     )

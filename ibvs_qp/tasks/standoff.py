@@ -45,7 +45,7 @@ class StandoffTask(Task):
 
     .. math:: F = m K_d (v - (-\dot e_s)) + F_{search}, \quad v = \min(K_p (e_s - e_{ref}), v_{max}(e_s))
 
-    `Model.filtered` follows with the filter of the push row: both act along n, and the damping amplifies noise.
+    `Model.filtered` follows with the filter of the push row, except with a rotor lost: the damping amplifies noise.
     """
 
     weight_settings = ("weights.push",)
