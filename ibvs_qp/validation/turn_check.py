@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-#: Turns are compared over this time [s], and judged once the gyro's of an axis have this root sum of squares [rad], and
-#: this multiple of the noise of a turn by two attitudes: the correlation's deviation is then 0.2.
+#: Time of a turn [s]. An axis is judged when the root of the sum of its squared gyro turns exceeds two bounds: an angle
+#: [rad], and a multiple of the noise of a turn that is computed from two attitudes. The standard deviation of the
+#: correlation is then at most 0.2.
 TURN_TIME, LEAST_TURN, LEAST_RATIO = 0.25, math.radians(0.7), 5.0
 #: Turns after which that noise is known.
 LEAST_TURNS = 4
@@ -14,7 +15,7 @@ LEAST_TURNS = 4
 OPPOSED = -0.5
 #: A turn of the attitude counts up to this multiple of the gyro's: yaw is arbitrary and may leap.
 LARGEST_RATIO = 2.0
-#: A larger difference of both turns counts as this for the noise [rad]: a leap of yaw.
+#: Largest difference of the two turns that enters the noise [rad]; a leap of yaw is larger.
 LARGEST_NOISE = math.radians(3.0)
 
 
@@ -55,7 +56,10 @@ class TurnCheck:
         self.faults = (f"attitude: turns against the gyro about {axes}; one of both is FLU, not FRD",) if axes else ()
 
     def _noise(self, turns: Sequence[tuple[float, float]]) -> float:
-        """Largest mean square of an axis that no sign explains, with the turns of attitude and gyro added [rad^2]."""
+        """Add (attitude's, gyro's) turns of the axes [rad]; the noise of a turn of the worst axis, mean square [rad^2].
+
+        The gyro has either the sign of the attitude or the opposite one. The smaller residual of both is noise.
+        """
         self._turns += 1
         for axis, (seen, felt) in enumerate(turns):
             self._same_sign[axis] += min(abs(seen - felt), LARGEST_NOISE) ** 2

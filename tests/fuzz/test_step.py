@@ -26,8 +26,8 @@ PILOT_SHARE = 0.1
 LIES = (False, True)
 #: Longest burst of hostile steps, share of hostile ones in it, and bursts after which the flight recovers.
 BURST, HOSTILE, RECOVERED = 200, 0.9, 0.3
-#: Median difference after a recovery [N], of subjects without observers and integrals: what the estimates of contact
-#: and stiffness learnt stays, 0.051 N in a tenth of the campaign.
+#: Median difference after a recovery [N], of subjects without observers and integrals. Estimates of contact and
+#: stiffness keep what they learnt: 0.051 N in a tenth of the campaign.
 TYPICAL = 0.06
 
 

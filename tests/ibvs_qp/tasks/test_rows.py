@@ -183,7 +183,7 @@ def test_height_row_asks_for_nothing_new_where_nothing_is_limited(lines: int) ->
 
 
 def test_the_force_to_the_stand_off_is_filtered_as_the_push() -> None:
-    """The first tick moves the force along n by the share of the filter from that of the last thrusts, here none."""
+    """In one tick the target moves from the force of the last thrusts by 1 - exp(-dt / T) of the way to the wish."""
     wall, config = Wall(np.array([1.0, 0.0, 0.0, 0.0]), 0.6), ControllerConfig()
     asked = []
     for filter_s in (0.0, 0.02):
