@@ -20,8 +20,8 @@ def _lead(of: str, default: float) -> Any:
 
 
 def _filter(rows: str, default: float) -> Any:
-    """Setting of a row filter; 0 is none."""
-    return _gain(default, f"filter of the {rows} towards the last achieved command", unit="s", high=0.5)
+    """Setting of a row filter; 0 is none, and with 0.5 s an approach is unstable."""
+    return _gain(default, f"filter of the {rows} towards the last achieved command", unit="s", high=0.1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class Gains:
     force_kfp: float = _gain(0.02, "force error K_fp, up to contact.full_gain_stiffness_n_m", high=10.0)
     force_kfi: float = _gain(0.0, "integral of the force error K_fi", unit="1/s", high=50.0)
     push_lead_s: float = _lead("rate of penetration or distance, in impedance and approach", 0.0575)
-    push_filter_s: float = _filter("push row", 0.0135)
+    push_filter_s: float = _filter("push and stand-off rows", 0.0135)
 
     def __post_init__(self) -> None:
         """Validate."""

@@ -1,4 +1,4 @@
-"""Robustness of the loops of roll, pitch, yaw and lines of a controller."""
+"""Robustness of the loops of roll, pitch, yaw, lines and stand-off of a controller."""
 
 from __future__ import annotations
 
@@ -15,20 +15,24 @@ TICKS_LATE = 1.5
 
 
 def motion_sensitivity(config: ControllerConfig, lag_ratio: float = 1.0) -> dict[str, float]:
-    """Sensitivity peaks of the loops "attitude", "yaw" and "line"; see `ibvs_qp.analysis.motion_loop`.
+    """Sensitivity peaks of "attitude", "yaw", "line", "standoff" and "landing"; see `ibvs_qp.analysis.motion_loop`.
 
-    The rate of a line comes from the accelerometer and the camera; its lead from the motors' model.
+    The rates of lines and distance come from the accelerometer and the camera; their leads from the motors' model. The
+    last centimetre of an approach, "landing", has a damping of its own.
 
     Args:
         config: Gains, leads, filters, tick and motors.
         lag_ratio: Lag of the real motors over the configured one [-].
     """
     gains, rate, vehicle = config.gains, config.angular_rate, config.vehicle
-    gyro = rate.gyro_bandwidth_hz
+    gyro, approach, landing = rate.gyro_bandwidth_hz, gains.standoff_kd, config.contact.landing_kd
+    along, unlimited = (gains.push_lead_s, gains.push_filter_s), math.inf
     loops = {
         "attitude": (gains.attitude_kp, gains.attitude_kd, 0.0, rate.lead_s, gains.attitude_filter_s, gyro),
         "yaw": (gains.yaw_kp, gains.yaw_kd, 0.0, rate.lead_s, gains.yaw_filter_s, gyro),
-        "line": (gains.line_kp, gains.line_kd, gains.line_ki, gains.line_lead_s, gains.line_filter_s, math.inf),
+        "line": (gains.line_kp, gains.line_kd, gains.line_ki, gains.line_lead_s, gains.line_filter_s, unlimited),
+        "standoff": (approach * gains.standoff_kp, approach, 0.0, *along, unlimited),
+        "landing": (landing * gains.standoff_kp, landing, 0.0, *along, unlimited),
     }
     return {
         name: MotionLoop(

@@ -45,32 +45,35 @@ class StandoffTask(Task):
 
     .. math:: F = m K_d (v - (-\dot e_s)) + F_{search}, \quad v = \min(K_p (e_s - e_{ref}), v_{max}(e_s))
 
-    `Model.filtered` follows with the filter of the push row, except with a rotor lost: the damping amplifies noise.
+    `Model.filtered` follows with the filter of the push row, except with a rotor lost: the damping amplifies noise. The
+    output "standoff_command" is the unfiltered force: the analytic law adds to it what its lines need along n, and a
+    filter would feed that part back.
     """
 
     weight_settings = ("weights.push",)
 
     def rows(self, model: Model) -> list[TaskRow]:
         """One row in newtons, so that the blend with the push row is linear in lambda."""
-        tilted = model.attitude.tilted
+        tilted, force, lost = model.attitude.tilted, self.force(model), _lost_force(model)
+        model.output("standoff_command", ca.if_else(tilted, lost, force))
+        filtered = model.filtered(force, model.force_along_normal, model.gains.push_filter_s)
         level = ca.if_else(tilted, LOST_WEIGHT, 1.0)  # what it cannot reach shall not cost moments
         return [
             TaskRow(
                 name="standoff",
                 unit="N",
                 expression=model.force_along_normal,
-                target=model.output("standoff_command", ca.if_else(tilted, _lost_force(model), self.force(model))),
+                target=ca.if_else(tilted, lost, filtered),
                 weight=model.config.weights.push * (1.0 - model.contact_weight) * level,
             )
         ]
 
     def force(self, model: Model) -> ca.SX:
-        """The approach law [N]."""
+        """The approach law, without the filter [N]."""
         gains, settings, motion = model.gains, model.config.contact, approach(model)
         landing = ca.logic_and(model.target.press, model.contact.distance < settings.touch_distance_m)
         damping = model.config.vehicle.mass_kg * ca.if_else(landing, settings.landing_kd, gains.standoff_kd)
-        force = ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
-        return model.filtered(force, model.force_along_normal, gains.push_filter_s)
+        return ca.if_else(model.contact.known, damping * motion.speed_error + motion.search, 0.0)
 
 
 def _lost_force(model: Model) -> ca.SX:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ibvs_qp.analytic import RANK_TOLERANCE, analytic_thrusts
-from ibvs_qp.config import ControllerConfig, Weights
+from ibvs_qp.config import ControllerConfig, Gains, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.painting.command import PainterInput, PaintingCommand
@@ -158,12 +158,13 @@ def paper_profile(weight: float) -> ControllerConfig:
     """The program that approaches the paper's law as the weight of the line rows grows.
 
     All null-space targets have weight 1 on the scale of mass-weighted acceleration, effort almost none. There are no
-    barriers, and line errors are measured at the image centre.
+    barriers, line errors are measured at the image centre, and the stand-off row has no filter.
     """
     mass = ControllerConfig().vehicle.mass_kg
     tasks = {"level": 1.0, "yaw": 1.0, "velocity": 1.0, "push": 1.0 / mass**2}
     weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **tasks)
-    printed = ControllerConfig(analytic_line_point="centre", analytic_angle_row=True)
+    gains = Gains(push_filter_s=0.0)
+    printed = ControllerConfig(gains=gains, analytic_line_point="centre", analytic_angle_row=True)
     return replace(printed, weights=weights, line_profile="paper", barriers=False)
 
 

@@ -45,7 +45,8 @@ class MpcController(PaperController):
         """The shipped set-points, with the prediction's values beside them."""
         config, model = self.config, Model(self.config)
         rows = [row for task in default_tasks(config) for row in task.rows(model)]
-        prediction = Prediction(model, self.settings, {row.name: row.target for row in rows})
+        forces = {row.name: row.target for row in rows} | {"standoff": model.signals.outputs["standoff_command"]}
+        prediction = Prediction(model, self.settings, forces)
         setpoints = Setpoints(model, prediction.values())
         values, inputs, step = setpoints.step.extra, setpoints.step.inputs, config.vehicle.thrust_rate_n_s
         patterns = prediction.generator.sparsity(), prediction.rows.sparsity()

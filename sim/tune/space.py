@@ -40,7 +40,7 @@ GAIN_RANGES = {
     "force_ksp": (10.0, 300.0),
     "force_ksd": (30.0, 250.0),
     "force_kfp": (0.0, 1.0),
-    "push_filter_s": (0.0, 0.03),
+    "push_filter_s": (0.0, 0.02),
 }
 #: The same of the one weight of the QP that acts without an active limit: it spreads a change of thrust over ticks.
 SMOOTHNESS = {"smoothness": (1e-3, 1.0)}

@@ -17,7 +17,7 @@ from allocation import control_effectiveness
 from allocation.geometry import TAROT_T960
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig, Weights
+from ibvs_qp.config import ControllerConfig, Gains, Weights
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
@@ -44,8 +44,8 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
     matrix = control_effectiveness(vehicle.geometry)
     inertia = np.array([vehicle.mass_kg] * 3 + list(vehicle.inertia_kg_m2))
     per_thrust, drift = matrix / inertia[:, None], setpoints.bias_wrench / inertia
-    before = per_thrust @ last + drift  # where the filter of the line rows starts
-    kept = math.exp(-config.tick_s / gains.line_filter_s)
+    before = per_thrust @ last + drift  # where the filters start
+    kept, kept_along = (math.exp(-config.tick_s / time) for time in (gains.line_filter_s, gains.push_filter_s))
     rows: list[tuple[np.ndarray, float, float]] = []  # row on the acceleration, wish, weight
     selection = np.eye(6)
     selection[:3, :3] -= np.outer(setpoints.normal, setpoints.normal)
@@ -61,7 +61,8 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
     along = np.concatenate((vehicle.mass_kg * setpoints.normal, np.zeros(3)))
     rows.append((along, setpoints.push_command, weights.push * share))
-    rows.append((along, setpoints.standoff_command, weights.push * (1.0 - share)))
+    standoff = setpoints.standoff_command + kept_along * (along @ before - setpoints.standoff_command)
+    rows.append((along, standoff, weights.push * (1.0 - share)))
     for axis, weight in ((0, weights.level), (1, weights.level), (2, weights.yaw)):
         rows.append((np.eye(6)[3 + axis], setpoints.angular[axis], weight))
     for direction, wish, fixed in (
@@ -116,7 +117,8 @@ def test_in_the_paper_profile_the_program_converges_to_the_paper_law(lines: int)
     errors = []
     for weight in (1e2, 1e3, 1e4, 1e6):
         weights = Weights(line=weight, effort=1e-9, smoothness=0.0, line_sigma=1.0, **wishes)
-        printed = ControllerConfig(analytic_line_point="centre", analytic_angle_row=True)
+        gains = Gains(push_filter_s=0.0)  # the analytic law has no filter of the stand-off
+        printed = ControllerConfig(gains=gains, analytic_line_point="centre", analytic_angle_row=True)
         config = replace(printed, weights=weights, line_profile="paper", barriers=False)
         controller, worst = HybridController(config), 0.0
         for seed in range(5):

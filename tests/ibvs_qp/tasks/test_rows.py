@@ -182,19 +182,46 @@ def test_height_row_asks_for_nothing_new_where_nothing_is_limited(lines: int) ->
         np.testing.assert_allclose(thrusts[0], thrusts[1], atol=0.06)  # of 27 N
 
 
-def test_the_force_to_the_stand_off_is_filtered_as_the_push() -> None:
-    """In one tick the target moves from the force of the last thrusts by 1 - exp(-dt / T) of the way to the wish."""
-    wall, config = Wall(np.array([1.0, 0.0, 0.0, 0.0]), 0.6), ControllerConfig()
-    asked = []
-    for filter_s in (0.0, 0.02):
-        gains = dataclasses.replace(config.gains, push_filter_s=filter_s)
-        controller = HybridController(dataclasses.replace(config, gains=gains))
-        pack(controller, measured(0, plane=wall.plane), Reference())
-        last = accelerations(controller, controller.setpoints.step.inputs["thrust_last"])
-        before = float(controller.setpoints.normal @ last[:3]) * config.vehicle.mass_kg
-        asked.append(rows(controller, np.full(6, 11.0))["standoff"][1] - before)
-    assert abs(asked[0]) > 1.0
-    assert asked[1] == pytest.approx((1.0 - math.exp(-config.tick_s / 0.02)) * asked[0], abs=1e-9)
+STANDOFFS = {
+    "approach": (0.3, Reference()),
+    "landing": (0.004, Reference(contact=True, push_force=5.0)),
+    "retreat": (0.1, Reference(standoff=0.5)),
+    "tilted": (0.3, Reference(tilt=np.array([0.1, 0.0]))),
+    "unknown wall": (None, Reference()),
+}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+@pytest.mark.parametrize("case", STANDOFFS)
+def test_the_force_to_the_stand_off_is_filtered_as_the_push(case: str, share: float) -> None:
+    """The target moves from the force of the last thrusts by 1 - exp(-dt / T) of the way to the approach law's."""
+    distance, reference = STANDOFFS[case]
+    level, rng = np.array([1.0, 0.0, 0.0, 0.0]), np.random.default_rng(2)
+    plane = None if distance is None else Wall(level, distance).plane
+    controller, compared = HybridController(), 0
+    config = controller.config
+    kept = 0.0 if case == "tilted" else math.exp(-config.tick_s / config.gains.push_filter_s)
+    for tick in range(20):
+        last = rng.uniform(8.0, 14.0, 6)
+        pack(controller, measured(tick, plane=plane), reference, share=share, last=last)
+        setpoints = controller.setpoints
+        before = float(setpoints.normal @ accelerations(controller, last)[:3]) * config.vehicle.mass_kg
+        wanted = setpoints.standoff_command
+        found = rows(controller, np.full(6, 11.0))["standoff"][1]
+        assert found == pytest.approx(wanted + kept * (before - wanted), abs=1e-9)
+        compared += abs(before - wanted) > 0.5
+    assert compared > 10
+
+
+def test_the_analytic_law_has_no_filter_that_feeds_the_lines_back() -> None:
+    """Force along n of the last thrusts, of which a part serves the lines, does not enter the next command."""
+    controller, commands = HybridController(), []
+    for thrust in (9.0, 13.0):
+        controller.reset()
+        lines = line_references(2)
+        pack(controller, measured(0), Reference(lines=lines), share=0.0, last=np.full(6, thrust))
+        commands.append(controller.setpoints.standoff_command)
+    assert commands[0] == pytest.approx(commands[1], abs=1e-9)
 
 
 def test_signs_of_the_wishes(controller: HybridController) -> None:
