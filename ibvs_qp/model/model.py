@@ -233,8 +233,11 @@ class Model:
             row: :math:`J \dot\nu`.
             time_s: T [s]; 0 is no filter.
         """
-        share = ca.exp(-self.config.tick_s / ca.fmax(time_s, LEAST_FILTER))
-        return target + share * (self.at(row, self.acceleration_commanded) - target)
+        return target + self.filter_share(time_s) * (self.at(row, self.acceleration_commanded) - target)
+
+    def filter_share(self, time_s: ca.SX) -> ca.SX:
+        """Share :math:`k_u` of the last command in a target behind a filter [-]."""
+        return ca.exp(-self.config.tick_s / ca.fmax(time_s, LEAST_FILTER))
 
     @property
     def normal(self) -> ca.SX:

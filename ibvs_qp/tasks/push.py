@@ -12,6 +12,11 @@ from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
+#: What the limits took from the push in the last tick passes the filter, up to this force [N]: three times the noise of
+#: a push at the limits. More would put the full weight of an unreachable push on the other rows.
+OWED_PUSH = 1.0
+#: And up to this ratio to the wrench given up [-], so that a limit that is just touched changes nothing at once.
+OWED_RATIO = 4.0
 
 
 class PushTask(Task):
@@ -23,8 +28,8 @@ class PushTask(Task):
 
     F_ref is the push reference within reach times the ramp after touch, T the lead against the motors' lag; push f and
     rate v of the penetration are those of `ibvs_qp.estimation.push_disturbance`, whose forces h contains.
-    `Model.filtered` follows. (Paper, equation 14, with the sign of the force feedback corrected; its e_s is the
-    distance of the tip, here from the penetration of the reference.)
+    `Model.filtered` follows, from the last command and what the limits took from it. (Paper, equation 14, with the sign
+    of the force feedback corrected; its e_s is the distance of the tip, here from the penetration of the reference.)
     """
 
     weight_settings = ("weights.push",)
@@ -53,7 +58,16 @@ class PushTask(Task):
         if model.config.impedance:
             damped = felt.rate + gains.push_lead_s * felt.acceleration
             target += gains.force_ksp * error / stiffness - gains.force_ksd * damped
-        return model.filtered(target, model.force_along_normal, gains.push_filter_s)
+        return self._filtered(model, target)
+
+    def _filtered(self, model: Model, target: ca.SX) -> ca.SX:
+        """Target behind the filter [N]: a limit that noise reaches for a tick does not lower the push of the next."""
+        row, signals, filter_s = model.force_along_normal, model.signals, model.gains.push_filter_s
+        missing = signals.state("push_target") - model.at(row, model.acceleration_commanded)
+        most = ca.fmin(OWED_RATIO * signals.input("given_up"), OWED_PUSH)
+        owed = clamp(missing, -most, most)
+        filtered = model.filtered(target, row, filter_s) + model.filter_share(filter_s) * owed
+        return signals.remember("push_target", filtered)
 
     def _integral(self, model: Model, reference: ca.SX) -> ca.SX:
         """Integral of the force error [N s]: zero out of contact; while thrusts are limited it only falls.

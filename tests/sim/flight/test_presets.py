@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -76,17 +77,25 @@ def test_round_trip(file: Path) -> None:
     assert from_dict(PilotConfig, tomllib.loads(config.to_toml())) == config
 
 
-def test_the_kept_search_is_what_its_page_says() -> None:
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_the_kept_search_is_what_its_page_says(law: str) -> None:
     """It kept the shipped gains, from which it started."""
     docs = Path(__file__).parents[3] / "docs"
-    search = json.loads((docs / "tuning" / "qp_trials.json").read_text(encoding="utf-8"))
+    search = json.loads((docs / "tuning" / f"{law}_trials.json").read_text(encoding="utf-8"))
+    assert search["law"] == law
     assert search["trials"] == len(search["all_trials"]) == 200 and search["features"] == "geometric"
-    page = " ".join((docs / "tuning.md").read_text(encoding="utf-8").split())
-    assert f"completed every flight in {search['completed_trials']} trials" in page
+    rows = re.findall(
+        r"^\| (.+?) \| (.+?) \| (.+?) \|$", (docs / "tuning.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    cells = {title: dict(zip(("qp", "paper"), values, strict=True)) for title, *values in rows}
+    assert cells["trials that completed every flight"][law] == str(search["completed_trials"])
+    others = len(search["finalists"]) - 1
+    assert cells["of these better on the scenes of the search, within the bounds"][law] == str(others)
     assert search["chosen"] is None and search["gains"] is None
     first = search["all_trials"][0]
-    shipped = ibvs_qp.preset("qp").controller
-    assert first["smoothness"] == shipped.weights.smoothness
+    shipped = ibvs_qp.preset(law).controller
+    if law == "qp":
+        assert first["smoothness"] == shipped.weights.smoothness
     searched = set(first) & {field.name for field in dataclasses.fields(shipped.gains)}
     assert len(searched) == 22 and all(first[gain] == getattr(shipped.gains, gain) for gain in searched)
 
