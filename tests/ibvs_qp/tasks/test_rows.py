@@ -224,6 +224,23 @@ def test_the_analytic_law_has_no_filter_that_feeds_the_lines_back() -> None:
     assert commands[0] == pytest.approx(commands[1], abs=1e-9)
 
 
+@pytest.mark.parametrize(("given_up", "owed"), [(0.0, 0.0), (0.1, 0.4), (2.0, 1.0)])
+def test_what_limits_take_from_the_push_for_a_tick_passes_the_filter(given_up: float, owed: float) -> None:
+    """The filter starts from the last command and what limits took: 4 times the wrench given up, 1 N at most."""
+    controller, reference = HybridController(), Reference(push_force=5.0, contact=True)
+    low = 11.3 - 5.0 * controller.setpoints.inverse[:, 0]  # 5 N away from the wall
+    falling = np.array([-5.0 / controller.config.vehicle.mass_kg, 0.0, -9.81])
+    kept = math.exp(-controller.config.tick_s / controller.config.gains.push_filter_s)
+    targets = []
+    for given in (0.0, given_up):
+        controller.reset()
+        for tick in range(3):
+            controller.setpoints.note(low, given * (tick == 2))
+            pack(controller, measured(tick, specific_force=falling), reference, share=1.0, last=low)
+        targets.append(controller.setpoints.push_command)
+    assert targets[1] - targets[0] == pytest.approx(kept * owed, abs=1e-9)
+
+
 def test_signs_of_the_wishes(controller: HybridController) -> None:
     """A vehicle that rolls right, noses up, faces left of the wall or drifts right is asked to undo just that."""
     reference = Reference(lines=line_references(2))

@@ -107,11 +107,12 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
     ]
     start = int(250 * STEP_TIME) + 10
     ratio, frequency = ringing(push[start : start + 500], 0.004)
-    # The ringing itself counts as gusts in part.
-    nearest = min(margins, key=lambda margin: abs(margin.least_damping_ratio - ratio))
-    assert ratio == pytest.approx(nearest.least_damping_ratio, abs=0.05)
-    assert frequency == pytest.approx(nearest.frequency_hz, rel=0.05)
-    assert min(margin.least_damping_ratio for margin in margins) <= ratio + 0.05, "the flight has less than promised"
+    # The ringing itself counts as gusts in part: the flight is between the two.
+    ratios, frequencies = (
+        [getattr(each, name) for each in margins] for name in ("least_damping_ratio", "frequency_hz")
+    )
+    assert min(ratios) - 0.05 <= ratio <= max(ratios) + 0.05
+    assert 0.95 * min(frequencies) <= frequency <= 1.05 * max(frequencies)
 
 
 @pytest.mark.parametrize(
