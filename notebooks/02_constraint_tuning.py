@@ -239,8 +239,8 @@ def _(push_first):
 @app.cell(hide_code=True)
 def _():
     mo.md(r"""
-    **A bad force law: eleven times the force gain, no damping, no ramp.** The contact is a spring $k$ with a damper
-    under the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the
+    **A bad force law: a force gain of 4 instead of 0.02, no damping, no ramp.** The contact is a spring $k$ with a
+    damper under the mass $m$, and this force law makes it ring. The *force ceiling* bounds the push by the poles of the
     contact,
 
     $$
@@ -248,9 +248,9 @@ def _():
     $$
 
     with $\dot e_s < 0$ while the tip approaches, so that it brakes the tip before the spring is compressed. The flight
-    before has no ceiling: 17 N instead of 7 N at the peak, and the tip loses contact again and again. (Without the
-    approach barrier as well, the tip strikes with 34 N, and the supervisor ends the flight.) The ceiling is active in
-    every sixth tick, and the push still oscillates. With the shipped gains it is never active.
+    before has no ceiling: the tip loses contact again and again, with 19 N at the peak, until the supervisor ends the
+    flight. With the ceiling the push rings by 1 N and stays below 6.5 N; the ceiling is active in every third tick. With
+    the shipped gains it is never active.
     """)
     return
 
@@ -258,7 +258,7 @@ def _():
 @app.cell
 def _():
     bad_force_law = {
-        "pilot.controller.gains.force_kfp": 2.1,
+        "pilot.controller.gains.force_kfp": 4.0,
         "pilot.controller.gains.force_ksd": 0.0,
         "pilot.controller.touch_ramp": False,
     }

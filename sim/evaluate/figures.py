@@ -31,7 +31,7 @@ MATTERS = {
     "mm/s": (1.0, "a hundredth of the speed of painting"),
     "m": (0.01, "a centimetre"),
     "deg/s": (10.0, "rates after the loss of a rotor reach hundreds"),
-    "N/s": (5.0, "a tenth of the thrust rate of the QP law while painting, 53 N/s"),
+    "N/s": (5.0, "a seventh of the thrust rate of the QP law while painting, 37 N/s"),
 }
 #: Directions: more is better, less is better, neither.
 MORE, LESS, NEITHER = 1, -1, 0
