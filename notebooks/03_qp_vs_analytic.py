@@ -194,7 +194,7 @@ def _(pressed):
     *In fairness:* a push beyond reach is avoidable. Both laws have a reach check that limits the push reference to 97 %
     of the push that the rotors can hold; it is off here. Limits that no check foresees (a gust, a rotor that weakens)
     remain. The flown law has the line rows of the paper. The preset `paper`, with lines at the tip and without the
-    angle row, leans by 3.5 degrees at most in a hold of 8 s at 35 N (`docs/how_it_works/qp.md`).
+    angle row, leans by 1.1 degrees at most in a hold of 8 s at 35 N (`docs/how_it_works/qp.md`).
 
     ## A sloped edge: the cost of the angle rows
 
@@ -285,7 +285,7 @@ def _(rubbed):
     |---|---|---|
     | no active limit, line rows strictly first, free flight | none | – |
     | the same in contact | millinewtons | selection after the inversion instead of before it |
-    | no active limit, as shipped | small | weights, and line errors at the tip |
+    | no active limit, as shipped | small | weights, line errors at the tip, and the filter of the stand-off row |
     | thrust at a limit | the law with printed rows loses attitude, the program gives up push | constraint, not clip |
     | sloped edge | the law with printed rows rolls with it | priority of the angle row |
     | friction | negligible | feed-forward, common to both |

@@ -1,4 +1,4 @@
-r"""Robustness of one axis of a rotation, or of one line, in free flight: the peak of its sensitivity.
+r"""Robustness of one axis of a rotation, of one line, or of the distance, in free flight: the peak of its sensitivity.
 
 A double integrator behind the motors' lag and the sampling, :math:`P(s) = e^{-s T_h} / (s^2 (\tau s + 1))`, under
 

@@ -177,7 +177,7 @@ class Setpoints:
     yaw = _number("angles", 2, "Yaw away from the wall normal [rad].")
     push_reference = _number("push_reference", 0, "Push reference within reach [N].")
     push_command = _number("push_command", 0, "Force along n of the push task [N].")
-    standoff_command = _number("standoff_command", 0, "Force along n of the stand-off task [N].")
+    standoff_command = _number("standoff_command", 0, "Unfiltered force along n of the approach law [N].")
     friction = _number("friction", 0, "Estimated friction coefficient.")
     reach = _number("reach", 0, "Largest push that the thrust limits allow [N].")
     least_push = _number("least_push", 0, "Smallest push that they allow [N]; above the reach when they allow none.")

@@ -12,11 +12,12 @@ from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
-#: What the limits took from the push in the last tick passes the filter, up to this force [N]: three times the noise of
-#: a push at the limits. More would put the full weight of an unreachable push on the other rows.
-OWED_PUSH = 1.0
-#: And up to this ratio to the wrench given up [-], so that a limit that is just touched changes nothing at once.
-OWED_RATIO = 4.0
+#: The filter adds the part of the last target that limits removed, at most [N]: noise of a push at its reach, 0.2 N of
+#: thrust times 5. More would put the full weight of an unreachable push on the other rows.
+PUSH_DEFICIT_BOUND = 1.0
+#: And at most this ratio to the wrench given up [N per N or N m]: a limit that is just touched changes nothing at once.
+#: With 1 a push at its reach loses another 0.02 N.
+PUSH_DEFICIT_RATIO = 4.0
 
 
 class PushTask(Task):
@@ -28,8 +29,9 @@ class PushTask(Task):
 
     F_ref is the push reference within reach times the ramp after touch, T the lead against the motors' lag; push f and
     rate v of the penetration are those of `ibvs_qp.estimation.push_disturbance`, whose forces h contains.
-    `Model.filtered` follows, from the last command and what the limits took from it. (Paper, equation 14, with the sign
-    of the force feedback corrected; its e_s is the distance of the tip, here from the penetration of the reference.)
+    `Model.filtered` follows; it starts at the last command and, within bounds, the part of the last target that limits
+    removed. (Paper, equation 14, with the sign of the force feedback corrected; its e_s is the distance of the tip,
+    here from the penetration of the reference.)
     """
 
     weight_settings = ("weights.push",)
@@ -47,7 +49,7 @@ class PushTask(Task):
         ]
 
     def force(self, model: Model) -> ca.SX:
-        """The force law [N]."""
+        """The force law behind its filter [N]; it writes the states of integral and filter, so call it once."""
         gains, contact = model.gains, model.contact
         reference = model.push_reference * contact.ramp
         felt, stiffness = model.push_disturbance, contact.stiffness
@@ -61,12 +63,16 @@ class PushTask(Task):
         return self._filtered(model, target)
 
     def _filtered(self, model: Model, target: ca.SX) -> ca.SX:
-        """Target behind the filter [N]: a limit that noise reaches for a tick does not lower the push of the next."""
+        """Target behind the filter [N]: a limit that noise reaches for a tick does not lower the push of the next.
+
+        The part removed is last target minus last command, with the present disturbance; the wrench given up is zero
+        without an active limit.
+        """
         row, signals, filter_s = model.force_along_normal, model.signals, model.gains.push_filter_s
         missing = signals.state("push_target") - model.at(row, model.acceleration_commanded)
-        most = ca.fmin(OWED_RATIO * signals.input("given_up"), OWED_PUSH)
-        owed = clamp(missing, -most, most)
-        filtered = model.filtered(target, row, filter_s) + model.filter_share(filter_s) * owed
+        bound = ca.fmin(PUSH_DEFICIT_RATIO * signals.input("given_up"), PUSH_DEFICIT_BOUND)
+        deficit = clamp(missing, -bound, bound)
+        filtered = model.filtered(target, row, filter_s) + model.filter_share(filter_s) * deficit
         return signals.remember("push_target", filtered)
 
     def _integral(self, model: Model, reference: ca.SX) -> ca.SX:

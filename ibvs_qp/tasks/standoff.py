@@ -69,7 +69,7 @@ class StandoffTask(Task):
         ]
 
     def force(self, model: Model) -> ca.SX:
-        """The approach law, without the filter [N]."""
+        """The approach law, without its filter [N]."""
         gains, settings, motion = model.gains, model.config.contact, approach(model)
         landing = ca.logic_and(model.target.press, model.contact.distance < settings.touch_distance_m)
         damping = model.config.vehicle.mass_kg * ca.if_else(landing, settings.landing_kd, gains.standoff_kd)

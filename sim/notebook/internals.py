@@ -158,7 +158,7 @@ def paper_profile(weight: float) -> ControllerConfig:
     """The program that approaches the paper's law as the weight of the line rows grows.
 
     All null-space targets have weight 1 on the scale of mass-weighted acceleration, effort almost none. There are no
-    barriers, line errors are measured at the image centre, and the stand-off row has no filter.
+    barriers, line errors are measured at the image centre, and push and stand-off rows have no filter.
     """
     mass = ControllerConfig().vehicle.mass_kg
     tasks = {"level": 1.0, "yaw": 1.0, "velocity": 1.0, "push": 1.0 / mass**2}

@@ -142,7 +142,7 @@ def analytic_setting(setting: Setting, own_gains: bool = True) -> Setting:
 
     Args:
         setting: Setting of the QP law.
-        own_gains: Take the gains of the analytic law's own preset, tuned by the same search; else those of `setting`.
+        own_gains: Take the gains of the analytic law's own preset; else those of `setting`.
     """
     plain = ibvs_qp.preset("paper" if own_gains else "qp").controller
     changes = {name: getattr(plain, name) for name in ("weights", "limits", "solver")}

@@ -45,6 +45,7 @@ class MpcController(PaperController):
         """The shipped set-points, with the prediction's values beside them."""
         config, model = self.config, Model(self.config)
         rows = [row for task in default_tasks(config) for row in task.rows(model)]
+        # Without the filter of its row: that starts at a command which serves the lines, too.
         forces = {row.name: row.target for row in rows} | {"standoff": model.signals.outputs["standoff_command"]}
         prediction = Prediction(model, self.settings, forces)
         setpoints = Setpoints(model, prediction.values())

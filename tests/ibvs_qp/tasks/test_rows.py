@@ -23,6 +23,7 @@ from law_only import evaluate_law
 from scipy.spatial.transform import Rotation
 
 from allocation import control_effectiveness
+from ibvs_qp.analytic import analytic_wrench
 from ibvs_qp.config import ControllerConfig, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
@@ -191,9 +192,8 @@ STANDOFFS = {
 }
 
 
-@pytest.mark.parametrize("share", [0.0, 0.4])
 @pytest.mark.parametrize("case", STANDOFFS)
-def test_the_force_to_the_stand_off_is_filtered_as_the_push(case: str, share: float) -> None:
+def test_the_force_to_the_stand_off_is_filtered_as_the_push(case: str) -> None:
     """The target moves from the force of the last thrusts by 1 - exp(-dt / T) of the way to the approach law's."""
     distance, reference = STANDOFFS[case]
     level, rng = np.array([1.0, 0.0, 0.0, 0.0]), np.random.default_rng(2)
@@ -203,7 +203,7 @@ def test_the_force_to_the_stand_off_is_filtered_as_the_push(case: str, share: fl
     kept = 0.0 if case == "tilted" else math.exp(-config.tick_s / config.gains.push_filter_s)
     for tick in range(20):
         last = rng.uniform(8.0, 14.0, 6)
-        pack(controller, measured(tick, plane=plane), reference, share=share, last=last)
+        pack(controller, measured(tick, plane=plane), reference, share=0.0, last=last)
         setpoints = controller.setpoints
         before = float(setpoints.normal @ accelerations(controller, last)[:3]) * config.vehicle.mass_kg
         wanted = setpoints.standoff_command
@@ -215,30 +215,38 @@ def test_the_force_to_the_stand_off_is_filtered_as_the_push(case: str, share: fl
 
 def test_the_analytic_law_has_no_filter_that_feeds_the_lines_back() -> None:
     """Force along n of the last thrusts, of which a part serves the lines, does not enter the next command."""
-    controller, commands = HybridController(), []
-    for thrust in (9.0, 13.0):
+    controller, wall = HybridController(), Wall(np.array([1.0, 0.0, 0.0, 0.0]), 0.6)
+    commands, targets, wrenches = [], [], []
+    for last in (np.full(6, 11.3), np.array([14.0, 14.0, 10.0, 10.0, 10.0, 10.0])):
         controller.reset()
-        lines = line_references(2)
-        pack(controller, measured(0), Reference(lines=lines), share=0.0, last=np.full(6, thrust))
+        seen = measured(0, plane=wall.plane, lines=(wall.line(0.09, 0.5 * math.pi, HORIZONTAL),))
+        pack(controller, seen, Reference(lines=line_references(1)), share=0.0, last=last)
         commands.append(controller.setpoints.standoff_command)
-    assert commands[0] == pytest.approx(commands[1], abs=1e-9)
+        wrenches.append(controller.setpoints.normal @ analytic_wrench(controller.setpoints)[:3])
+        targets.append(rows(controller, last)["standoff"][1])
+    assert commands[0] == pytest.approx(commands[1], abs=1e-9) and commands[0] > 1.0
+    assert wrenches[0] == pytest.approx(wrenches[1], abs=0.05)  # the line row itself has a filter
+    assert targets[1] - targets[0] > 1.0, "the row of the QP has the filter"
 
 
-@pytest.mark.parametrize(("given_up", "owed"), [(0.0, 0.0), (0.1, 0.4), (2.0, 1.0)])
-def test_what_limits_take_from_the_push_for_a_tick_passes_the_filter(given_up: float, owed: float) -> None:
-    """The filter starts from the last command and what limits took: 4 times the wrench given up, 1 N at most."""
+DEFICITS = [(-1.0, 0.1, 0.4), (-1.0, 2.0, 1.0), (-1.0, 0.02, 0.08), (1.0, 2.0, -1.0)]
+
+
+@pytest.mark.parametrize(("side", "given_up", "deficit"), DEFICITS)
+def test_the_filter_of_the_push_adds_what_limits_removed(side: float, given_up: float, deficit: float) -> None:
+    """It starts from the last command and that part: 4 times the wrench given up, and 1 N, at most."""
     controller, reference = HybridController(), Reference(push_force=5.0, contact=True)
-    low = 11.3 - 5.0 * controller.setpoints.inverse[:, 0]  # 5 N away from the wall
-    falling = np.array([-5.0 / controller.config.vehicle.mass_kg, 0.0, -9.81])
+    last = 11.3 + side * 5.0 * controller.setpoints.inverse[:, 0]  # 5 N away from the wall, or towards it
+    falling = np.array([side * 5.0 / controller.config.vehicle.mass_kg, 0.0, -9.81])
     kept = math.exp(-controller.config.tick_s / controller.config.gains.push_filter_s)
     targets = []
     for given in (0.0, given_up):
         controller.reset()
         for tick in range(3):
-            controller.setpoints.note(low, given * (tick == 2))
-            pack(controller, measured(tick, specific_force=falling), reference, share=1.0, last=low)
+            controller.setpoints.note(last, given * (tick == 2))
+            pack(controller, measured(tick, specific_force=falling), reference, share=1.0, last=last)
         targets.append(controller.setpoints.push_command)
-    assert targets[1] - targets[0] == pytest.approx(kept * owed, abs=1e-9)
+    assert targets[1] - targets[0] == pytest.approx(kept * deficit, abs=1e-9)
 
 
 def test_signs_of_the_wishes(controller: HybridController) -> None:

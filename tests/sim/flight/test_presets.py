@@ -92,6 +92,14 @@ def test_the_kept_search_is_what_its_page_says(law: str) -> None:
     others = len(search["finalists"]) - 1
     assert cells["of these better on the scenes of the search, within the bounds"][law] == str(others)
     assert search["chosen"] is None and search["gains"] is None
+    failed, path = ([each[key] for each in search["finalists"].values()] for key in ("failed", "scenes"))
+    why = cells["why none was chosen, on the seeds of the choice"][law]
+    if law == "qp":
+        low, high = (round(100.0 * share) for share in (min(failed[1:]), max(failed[1:])))
+        assert why == f"{low} to {high} % of their flights fail" and not failed[0]
+    else:
+        own, found = (each["sticking slide"]["path_rms_m"] for each in path)
+        assert why == f"the path of the sticking slide is {found / own:.1f} times as wide"
     first = search["all_trials"][0]
     shipped = ibvs_qp.preset(law).controller
     if law == "qp":
