@@ -117,8 +117,9 @@ def _(flight):
     **What to see.** Hover thrusts are 11.3 N per rotor. In free flight the two commands differ by
     {np.median(_gap[_free]):.2f} N (median of the worst rotor), in full contact by {np.median(_gap[_touch]):.2f} N.
     While no limit is active, the black curve lies on the orange one: *all* of the difference comes from the weights,
-    the line rows and the filter of the stand-off row, none from the allocation. Six rotors produce six wrench components,
-    so **for a wrench within reach every allocation gives the same thrusts**, clipped pseudo-inverse or program.
+    the line rows and the filter of the stand-off row, none from the allocation. Six rotors produce six wrench
+    components, so **for a wrench within reach every allocation gives the same thrusts**, clipped pseudo-inverse or
+    program.
 
     On an ordinary tick the program therefore has no advantage by being a program. Its advantages are the content of its
     rows, and its behaviour when they cannot be met together.
