@@ -17,7 +17,8 @@ UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 #: The push by inertial data exceeds the measured one by so many standard deviations of the wind [-]: 4.5 left alarms in
 #: 2 of 16 flights in gusts of 2 and 3 N rms.
 WIND_SIGMAS = 6.0
-#: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N.
+#: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N. That
+#: of free flight has no friction in it, and excuses as much as `NORMAL_WIND`.
 MOST_WIND = 10.0
 #: A sensor that measures this fraction of its reference, and this push at least, is not dead [-, N].
 FOLLOWED, LEAST_FOLLOWED = 0.5, 1.0
@@ -52,7 +53,7 @@ class PushMonitor:
         self._high.reset()
         self._unfelt.reset()
         self._reference, self._since = 0.0, 0.0
-        self._mean, self._wind, self._time = 0.0, 0.0, 0.0
+        self._mean, self._wind, self._free_wind, self._time = 0.0, 0.0, 0.0, 0.0
 
     def update(self, tick: Tick, response: Response, time_s: float) -> None:
         """Add the faults of the push."""
@@ -64,8 +65,10 @@ class PushMonitor:
         least = min(max(UNFELT_OVER_REFERENCE * reference, LEAST_UNFELT), settings.unfelt_push_n)
         unfelt = inertial > least and push < settings.unfelt_ratio * inertial and contact.distance < NEAR_WALL
         spread = WIND_SIGMAS * response.wind_spread
+        if contact.distance > NEAR_WALL:
+            self._free_wind = min(spread, NORMAL_WIND)
         followed, normal_wind = self._normal_wind(inertial - push, push, reference, time_s)
-        wind = max(spread, NORMAL_WIND) if followed else max(min(spread, MOST_WIND), normal_wind)
+        wind = max(spread, NORMAL_WIND) if followed else max(min(spread, MOST_WIND), self._free_wind, normal_wind)
         windy = inertial - push <= wind
         if self._unfelt.update(unfelt and not windy, time_s):
             tick.faults[Fault.PUSH_UNFELT] = f"{inertial:.1f} N, measured {push:.1f} N"

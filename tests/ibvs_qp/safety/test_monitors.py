@@ -157,6 +157,19 @@ def test_a_gust_that_takes_the_tip_off_the_wall_is_no_failed_sensor(pressed: flo
     assert (Fault.PUSH_UNFELT in first_found(blown_off, response)) is finds
 
 
+@pytest.mark.parametrize(("inertial", "finds"), [(12.0, False), (16.0, True)])
+def test_wind_of_free_flight_blows_on_before_the_touch(inertial: float, finds: bool) -> None:
+    """Friction is no part of it; 11 N along the normal ended flights in gusts of 4 N rms before they pressed."""
+
+    def approaching(number: int) -> dict[str, Any]:
+        far = number < BEGIN + 250
+        contact = CONTACT._replace(push=0.0, distance=0.3 if far else 0.005, in_contact=False)
+        return {"contact": contact, "press": not far}
+
+    found = first_found(approaching, StubResponse(inertial_push=inertial, wind_spread=2.6), 500)
+    assert (Fault.PUSH_UNFELT in found) is finds
+
+
 def test_far_from_the_wall_wind_is_no_push() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(push=0.0, distance=0.3, in_contact=False), "press": False},
