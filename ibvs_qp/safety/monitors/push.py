@@ -17,8 +17,8 @@ UNFELT_OVER_REFERENCE, LEAST_UNFELT = 1.6, 4.0
 #: The push by inertial data exceeds the measured one by so many standard deviations of the wind [-]: 4.5 left alarms in
 #: 2 of 16 flights in gusts of 2 and 3 N rms.
 WIND_SIGMAS = 6.0
-#: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N. Wind
-#: of free flight has no friction in it, and excuses as much as `NORMAL_WIND`.
+#: The wind excuses no larger difference [N]: with a dead sensor friction counts as wind, and the push reached 22 N.
+#: Wind of free flight has no friction in it, and excuses as much as `NORMAL_WIND`.
 MOST_WIND = 10.0
 #: A sensor that measures this fraction of its reference, and this push at least, is not dead [-, N].
 FOLLOWED, LEAST_FOLLOWED = 0.5, 1.0
