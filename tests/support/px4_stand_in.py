@@ -129,11 +129,12 @@ class Camera:
 
 
 def run_camera(domain: int, rate_hz: float, camera: Camera, pose: Any) -> None:
-    """Publish pictures of the pose that another process writes: position and quaternion."""
+    """Publish pictures of the pose, position and quaternion, that the parent process writes, as long as it lives."""
+    parent = multiprocessing.parent_process()
     part, topics = Participant(domain), Px4Topics()
     color, depth = part.writer(topics.color, IMAGE), part.writer(topics.depth, IMAGE)
     info = part.writer(topics.camera_info, CAMERA_INFO)
-    while True:
+    while parent is None or parent.is_alive():
         begin, stamp = time.monotonic(), time.time_ns()
         with pose.get_lock():
             now = np.array(pose[:])
