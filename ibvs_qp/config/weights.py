@@ -34,7 +34,7 @@ class Weights:
         400.0, "roll and pitch rows", "s^4/rad^2", "0.05 rad/s^2: 3.5 cm/s^2 at the tip, less than the lines accept"
     )
     yaw: float = _weight(
-        60.0, "yaw row", "s^4/rad^2", "0.13 rad/s^2: a lasting push beyond reach turns the vehicle by 0.1 deg"
+        400.0, "yaw row", "s^4/rad^2", "as roll and pitch; with 60 a vehicle whose rotors weaken hits the ground"
     )
     velocity: float = _weight(
         100.0, "free velocity rows", "s^4/m^2", "0.1 m/s^2, as the lines: yields before height and level flight"

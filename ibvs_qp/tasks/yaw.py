@@ -13,8 +13,8 @@ from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.task import Task
 
 #: With a rotor lost: largest yaw acceleration [rad/s^2] and weight over that of a level vehicle [-]. The moment that is
-#: left about the vertical has one sign; yaw takes what roll and pitch leave, at a twentieth of their weight.
-LOST_ACCELERATION, LOST_WEIGHT = 2.0, 1.0 / 3.0
+#: left about the vertical has one sign; yaw takes what roll and pitch leave.
+LOST_ACCELERATION, LOST_WEIGHT = 2.0, 0.05
 #: Beyond this angle a vehicle that lost a rotor only damps the turn [rad].
 LARGEST_TURN = 0.5 * math.pi
 

@@ -13,11 +13,10 @@ from ibvs_qp.qp.problem import AffineRows, QpProblem
 from ibvs_qp.tasks.task import Task
 
 #: Task rows by the start of their names, highest priority first. The order is that of the shipped weights per squared
-#: newton of thrust or force, but for yaw: roll and pitch 1900 (400 over inertia, times lever), height 44, yaw 17, lines
-#: 11, velocity 2.8, push and stand-off 0.5, and the rest at most 0.001. Height, lines and velocity command the same two
-#: directions, so they share a level, and yaw is above it. Other orders fly worse: with yaw beside roll and pitch a
-#: vehicle that lost a rotor brakes its turn and strikes the wall; with the push above height a push beyond reach lifts
-#: the tip by 28 mm.
+#: newton of thrust or force: roll and pitch 1900 and yaw 110 (400 over inertia, times lever), height 44, lines 11,
+#: velocity 2.8, push and stand-off 0.5, and the rest at most 0.001. Height, lines and velocity command the same two
+#: directions, so they share a level. Other orders fly worse: with yaw beside roll and pitch a vehicle that lost a
+#: rotor brakes its turn and strikes the wall; with the push above height a push beyond reach lifts the tip by 28 mm.
 LEVELS: tuple[tuple[str, ...], ...] = (
     ("roll", "pitch"),
     ("yaw",),

@@ -28,7 +28,7 @@ def test_the_program_gives_up_lateral_force_alone(rows: dict) -> None:
     program = rows["program"]
     assert program["vertical_n"] <= 0.5
     assert program["roll_pitch_nm"] <= 0.05
-    assert program["yaw_nm"] <= 0.2
+    assert program["yaw_nm"] <= 0.05
     assert program["lateral_n"] > 10.0
 
 
