@@ -247,9 +247,9 @@ def _():
     $$
 
     with $\dot e_s < 0$ while the tip approaches, so that it brakes the tip before the spring is compressed. The flight
-    before has no ceiling: the tip loses contact again and again, with 19 N at the peak, until the supervisor ends the
-    flight. With the ceiling the push rings by 1 N and stays below 6.5 N; the ceiling is active in a third of the ticks
-    in contact. With the shipped gains it is never active.
+    before has no ceiling: the tip loses contact again and again, with 18 N at the peak. With the ceiling the push rings
+    by 1 N and stays below 6.5 N; the ceiling is active in a third of the ticks in contact. With the shipped gains it is
+    never active.
     """)
     return
 
