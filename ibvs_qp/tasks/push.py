@@ -16,7 +16,6 @@ FORCE_INTEGRAL_BOUND = 8.0
 #: thrust times 5. More would put the full weight of an unreachable push on the other rows.
 PUSH_DEFICIT_BOUND = 1.0
 #: And at most this ratio to the wrench given up [N per N or N m]: a limit that is just touched changes nothing at once.
-#: With 1 a push at its reach loses another 0.02 N.
 PUSH_DEFICIT_RATIO = 4.0
 
 

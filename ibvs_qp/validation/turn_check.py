@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-#: Time of a turn [s]. An axis is judged when the root of the sum of its squared gyro turns exceeds two bounds: an angle
-#: [rad], and a multiple of the noise of a turn that is computed from two attitudes. The standard deviation of the
-#: correlation is then at most 0.2.
+#: Duration of one turn [s]. An axis is judged once its gyro turns, as root of the sum of squares, exceed an angle [rad]
+#: and this multiple of the noise in one turn of the attitude [-]. The standard deviation of the correlation is then at
+#: most 0.2.
 TURN_TIME, LEAST_TURN, LEAST_RATIO = 0.25, math.radians(0.7), 5.0
 #: Turns after which that noise is known.
 LEAST_TURNS = 4

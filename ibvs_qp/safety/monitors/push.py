@@ -38,9 +38,9 @@ class PushMonitor:
 
     The sensor may be dead, or measure zero, before the touch or in contact; controller and observers then press until
     the rotors saturate, 30 N for 5 N. Thrust against acceleration measures the push without it. A gust changes that
-    figure too, so the sensor must disagree widely, and by more than the gusts along the wall explain. A dead sensor
-    does not follow the reference; one that does may differ by a gust along the normal, which nothing else measures.
-    That gust goes on when it takes the tip off the wall.
+    figure too, so the sensor must disagree widely, and by more than the gusts along the wall and those of the approach
+    explain. A dead sensor does not follow the reference; one that does may differ by a gust along the normal, which
+    nothing else measures. That gust goes on when it takes the tip off the wall.
     """
 
     def __init__(self, settings: SafetySettings) -> None:
