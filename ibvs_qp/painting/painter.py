@@ -93,8 +93,8 @@ class Painter(Navigation):
         self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
         self._touches = 0  # that were taken back, before the stroke in progress
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
-        self._longest = 0.0  # length of the stroke in progress, each pass included [m]
-        self._behind = 0.0  # part of it before its beginning, by a retouch [m]
+        self._longest = 0.0  # length of the stroke in progress, each pass and overshoot included [m]
+        self._behind = 0.0  # part of it before its beginning, by a gust or a retouch [m]
         self._painted_s = self._lost_s = 0.0  # time of painting, and of it without contact [s]
         self._lost_m = self._lost_at_ends_m = 0.0  # way of the stroke without contact, and of it near its ends [m]
         self._paused = self._follows_end = False
@@ -263,7 +263,6 @@ class Painter(Navigation):
         """Back along the stroke to where it may leave a gap, then again to its end; farther in both times."""
         back = not math.isnan(self._back_to)
         goal = self._back_to if back else self._stroke_goal()
-        self._behind = max(self._behind, -self.pattern.travel(self.row) * self._along.moved)
         if self._fails_by_time(inputs, f"the retouch of row {self.row}", goal):
             return self._stroke_command(inputs)
         first, _ = self._cross.stroke_place(*self._beside(REACTION_M, 0.5 * self.config.brush_width_m))
@@ -303,6 +302,7 @@ class Painter(Navigation):
         self._v_reference = self._slid(self._v_reference, v, dt)
         self._pause_without_contact(inputs)
         self._count_contact(inputs.push, remaining, dt)
+        self._measure_length(inputs)
         target = 0.0 if self._paused else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         if self._stroke_end.is_near(remaining):
@@ -321,6 +321,14 @@ class Painter(Navigation):
             self._lost_m = max(self._lost_m + advance, 0.0)
             if not half < remaining < self.config.stroke_m - half:
                 self._lost_at_ends_m = max(self._lost_at_ends_m + advance, 0.0)
+
+    def _measure_length(self, inputs: PainterInput) -> None:
+        """Measure the paint past both ends of the stroke, to which gusts push the tip; its end by the edge there."""
+        if not inputs.in_contact:
+            return
+        self._behind = max(self._behind, -self.pattern.travel(self.row) * self._along.moved)
+        if self._along_line.line is not None:
+            self._longest = max(self._longest, self._along.stroke_length)
 
     def _stroke_command(self, inputs: PainterInput) -> PaintingCommand:
         along = self._view_direction() * self._speed
@@ -390,7 +398,7 @@ class Painter(Navigation):
         self._enter(inputs, "paint", f"row {self.row}: {reason}")
 
     def _end_stroke(self, inputs: PainterInput) -> None:
-        self._longest = max(self._longest, self._along.stroke_length + self._behind)
+        self._longest = max(self._longest, self._along.stroke_length)
         self._cross.end_pass(*self._along.smoothed())
         if self._begin_retouch(inputs):
             return
@@ -432,11 +440,13 @@ class Painter(Navigation):
 
     def _doubt(self) -> str:
         """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
-        length, asked, goal = self._longest, self.config.stroke_m, self._stroke_goal()
+        length, asked, goal = self._longest + self._behind, self.config.stroke_m, self._stroke_goal()
         if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
             known = self._along.deviation
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
-        if abs(length - asked) + (known := self._along.length_deviation) > LENGTH_TOLERANCE_M:
+        error, known = self._along.stroke_length - asked, self._along.length_deviation
+        # The greatest of many estimates errs towards more: no margin.
+        if abs(error) + known > LENGTH_TOLERANCE_M or length - asked > LENGTH_TOLERANCE_M:
             return (
                 f"row {self.row} is {length * 1e3:.0f} mm long, known to {known * 1e3:.1f} mm, "
                 f"{asked * 1e3:.0f} mm were asked"

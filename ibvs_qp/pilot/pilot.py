@@ -387,6 +387,7 @@ class Pilot:
             outcome=command.outcome,
             faults=faults,
             has_camera=True,
+            plane_doubt=self._camera.plane_doubt,
         )
 
     def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:

@@ -67,6 +67,7 @@ class Tick:
         outcome: Of the controller's step.
         faults: Faults that the caller found; the monitors add theirs.
         has_camera: Whether there must be pictures and a plane some time after the first tick.
+        plane_doubt: Why the last picture has no sound plane; empty after one, or where unknown.
     """
 
     stamp_ns: int
@@ -87,3 +88,4 @@ class Tick:
     outcome: Outcome
     faults: dict[Fault, str]
     has_camera: bool = False
+    plane_doubt: str = ""

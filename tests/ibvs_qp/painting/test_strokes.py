@@ -540,6 +540,23 @@ def test_a_slide_before_the_beginning_by_a_retouch_is_length(stroke: int, slide:
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
 
+@pytest.mark.parametrize("end", [False, True])
+@pytest.mark.parametrize(("gust", "claimed"), [(0.006, True), (0.014, False)])
+def test_paint_past_an_end_by_a_gust_is_length(end: bool, gust: float, claimed: bool) -> None:
+    """The tip comes back, and the paint stays."""
+    world = PaintedWall(short(rows=1, stroke_m=1.0))
+    world.fly(60.0, until="paint")
+    while end and world.tip[0] < 0.998:
+        world.step()
+    moved = np.array(world.to_wall(gust if end else -gust, 0.0))
+    world.tip = world.tip + world.to_board(*moved)
+    world.odometer = world.odometer + moved
+    world.fly(60.0)
+    assert world.painter.finished and claimed != world.painter.failed
+    reason = r"row 1 is 101\d mm long, known to \d.\d mm, 1000 mm were asked"
+    assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
+
+
 def test_the_last_stroke_of_a_filling_job_overlaps_by_its_own_nominal_overlap() -> None:
     """The board ends 5 mm farther out than the third stroke's nominal place asks for: its nominal overlap is 3 mm."""
     margin, pitch, width = 0.05, 0.072, 0.08

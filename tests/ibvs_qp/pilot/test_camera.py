@@ -91,3 +91,28 @@ def test_perception_that_cannot_be_loaded_is_named(monkeypatch: pytest.MonkeyPat
         command = pilot.step(frame)
         assert [reason for reason in command.rejected if reason.startswith("image: perception: ImportError")]
     assert np.isfinite(command.thrusts).all()
+
+
+@pytest.mark.parametrize(
+    ("noise", "doubt"),
+    [(0.0, ""), (0.03, "depth scatters by at least 1."), (0.06, "depth scatters by 6.")],
+)
+def test_noise_of_the_depth_picture_reaches_the_supervisor_as_the_cause(
+    noise: float, doubt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pilot, rng, doubts = new_pilot(), np.random.default_rng(0), []
+    pilot.prepare()
+    watch = pilot.assurance.watch
+
+    def watched(tick, response) -> None:
+        doubts.append(tick.plane_doubt)
+        watch(tick, response)
+
+    monkeypatch.setattr(pilot.assurance, "watch", watched)
+    for seen in pictures()[:20]:
+        assert seen.image is not None
+        depth = seen.image.depth * (1.0 + noise * rng.standard_normal(seen.image.depth.shape))
+        image = replace(seen.image, depth=depth.astype(seen.image.depth.dtype))
+        rejected = pilot.step(replace(seen, image=image)).rejected
+        assert (f"image: {doubts[-1]}" in rejected) == doubts[-1].endswith("holds together")
+    assert any(found.startswith(doubt) for found in doubts) and (noise > 0.0) == any(doubts)

@@ -196,6 +196,13 @@ def test_without_a_camera_nothing_is_late() -> None:
         assert not tick.faults
 
 
+def test_a_wall_that_noise_hides_is_lost_with_its_cause() -> None:
+    assurance = Assurance(VEHICLE, SafetySettings())
+    tick = quiet_tick(200, plane_ns=0, plane_doubt="depth scatters")
+    assurance.watch(tick, StubResponse())
+    assert tick.faults[Fault.PLANE_STALE].endswith(" limit 300 ms; depth scatters")
+
+
 @pytest.mark.parametrize(("stamp", "fault"), [("imu_ns", Fault.IMU_STALE), ("wrench_ns", Fault.WRENCH_STALE)])
 def test_a_sensor_that_must_be_there_and_never_sent_is_late(stamp: str, fault: Fault) -> None:
     assurance = Assurance(VEHICLE, SafetySettings())

@@ -12,6 +12,7 @@ from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
 from ibvs_qp.vision.surface.plane import PlaneEstimate, PlaneFitter
+from ibvs_qp.vision.surface.refit_plane import depth_noise
 
 FOCAL, SHAPE = 625.2, (480, 640)
 INTRINSICS = (FOCAL, FOCAL, 319.5, 239.5)
@@ -117,6 +118,23 @@ def test_thin_evidence_is_refused_with_a_reason(change, reason: str) -> None:
     found = search(change(render(inverse_plane(0.5), 0.05, np.random.default_rng(0))).astype(np.float32))
     assert isinstance(found, str)
     assert reason in found or "no plane" in found
+
+
+@pytest.mark.parametrize("noise", [0.004, 0.0085, 0.025])
+def test_noise_of_single_samples_is_measured_whatever_the_surfaces(noise: float) -> None:
+    depth = render(inverse_plane(0.5, 10.0), 0.05, np.random.default_rng(0), noise=noise)
+    assert depth_noise(grid().inverse_depth(depth, 0.12, 6.0)) == pytest.approx(noise, rel=0.15)
+
+
+def test_noise_that_tears_the_surface_apart_is_named() -> None:
+    truth, rng = inverse_plane(0.5), np.random.default_rng(0)
+    places, fitter = grid(), PlaneFitter(PlaneConfig())
+    reasons = []
+    for _ in range(20):
+        inverse = places.inverse_depth(render(truth, 0.05, rng, noise=0.03), 0.12, 6.0)
+        found = fitter.track(places, inverse, 1.02 * truth, DOWN, None)
+        reasons.append(found if isinstance(found, str) else "")
+    assert any(reason.startswith("depth scatters by 3.") for reason in reasons), reasons
 
 
 def test_floor_is_no_working_surface() -> None:
