@@ -1,6 +1,6 @@
 """``python -m sim.scene_fuzz --draws 150 --first-seed 1000``: fly drawn scenes and count their outcomes.
 
-``--scenes FOLDER`` flies the scenes of a folder instead: none may fail, and none may push harder than 2.5 times the
+``--scenes PATH`` flies the scenes of a folder, or one file, instead: none may fail, and none may push harder than 2.5 times the
 reference. With ``--may-fail`` they may fail, but not crash, break or be claimed falsely. ``sim/scene_fuzz/hard`` has
 scenes that once crashed or shook. Prints every scene that is not complete, then figure, goal and n; exits 1 when a goal
 is missed.
@@ -34,7 +34,7 @@ def main() -> int:
     parser.add_argument("--draws", type=int, default=150, help="number of scenes")
     parser.add_argument("--first-seed", type=int, default=0, help="seed of the first; the next ones follow")
     parser.add_argument(
-        "--scenes", type=Path, help="folder of scenes (TOML) to fly instead of draws, each with --seeds"
+        "--scenes", type=Path, help="scene (TOML), or folder of scenes, to fly instead of draws, each with --seeds"
     )
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="seeds of the scenes of a folder")
     parser.add_argument("--may-fail", action="store_true", help="scenes of a folder may fail with a true reason")
@@ -46,7 +46,9 @@ def main() -> int:
     given = parser.parse_args()
     options = FlightOptions(law=given.law, features=given.features, video=False, compiled=True)
     if given.scenes is not None:
-        files = sorted(given.scenes.glob("*.toml"))
+        files = [given.scenes] if given.scenes.is_file() else sorted(given.scenes.glob("*.toml"))
+        if not files:
+            parser.error(f"--scenes: no scene (*.toml) in {given.scenes}")
         calls = [delayed(judge_file)(file, options, given.world, seed) for file in files for seed in given.seeds]
         bad, source = BAD if given.may_fail else (*BAD, FAILED), str(given.scenes)
     else:

@@ -7,6 +7,7 @@ import pytest
 
 from sim.flight.options import FlightOptions
 from sim.flight.preflight import job_problems
+from sim.scene_fuzz import __main__ as command
 from sim.scene_fuzz import judge as judging
 from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
 from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
@@ -75,6 +76,22 @@ def test_a_scene_of_a_file_is_refused_by_name(tmp_path):
     (tmp_path / "thin.toml").write_text("[paint]\noverlap_m = 0.08\n")
     judged = judge_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
     assert judged.outcome == "refused before flight" and str(judged).startswith("thin 3: refused before flight: ")
+
+
+@pytest.mark.parametrize(("path", "scenes"), [("thin.toml", 1), (".", 2)])
+def test_one_file_is_flown_as_a_folder_is(tmp_path, monkeypatch, capsys, path, scenes):
+    for name in ("thin.toml", "thick.toml"):
+        (tmp_path / name).write_text("[paint]\noverlap_m = 0.08\n")  # refused before flight
+    monkeypatch.setattr("sys.argv", ["scene_fuzz", "--scenes", str(tmp_path / path), "--seeds", "0", "1"])
+    assert command.main() == 0
+    assert f"n = {2 * scenes} flights" in capsys.readouterr().out
+
+
+def test_a_folder_without_scenes_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["scene_fuzz", "--scenes", str(tmp_path)])
+    with pytest.raises(SystemExit, match="2"):
+        command.main()
+    assert "no scene (*.toml) in" in capsys.readouterr().err
 
 
 @pytest.mark.slow
