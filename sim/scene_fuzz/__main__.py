@@ -1,9 +1,9 @@
 """``python -m sim.scene_fuzz --draws 150 --first-seed 1000``: fly drawn scenes and count their outcomes.
 
-``--scenes PATH`` flies the scenes of a folder, or one file, instead: none may fail, and none may push harder than 2.5 times the
-reference. With ``--may-fail`` they may fail, but not crash, break or be claimed falsely. ``sim/scene_fuzz/hard`` has
-scenes that once crashed or shook. Prints every scene that is not complete, then figure, goal and n; exits 1 when a goal
-is missed.
+``--scenes PATH`` flies the scenes of a folder, or one file, instead: none may fail, and none may push harder than 2.5
+times the reference. With ``--may-fail`` they may fail, but not crash, break or be claimed falsely.
+``sim/scene_fuzz/hard`` has scenes that once crashed or shook. Prints every scene that is not complete, then figure,
+goal and n; exits 1 when a goal is missed.
 """
 
 from __future__ import annotations
