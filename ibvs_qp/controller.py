@@ -134,8 +134,9 @@ class HybridController(CheckedLaw):
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
         unallocated, limits, given_up = np.zeros(6), (), 0.0
         if solution.limited:
-            unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             limits = active_limits(self.problem, solution.x, solution.y)
+        if solution.limited or data.beyond_limits:
+            unallocated = setpoints.effectiveness.dot(data.free - thrusts)
             given_up = max(map(abs, unallocated.tolist()))
         own = setpoints.note(thrusts, given_up)
         return Command(

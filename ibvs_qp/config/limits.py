@@ -53,6 +53,14 @@ class LimitSettings:
         low=0.0,
         high=10.0,
     )
+    thrust_noise_n: float = setting(
+        0.5,
+        "excess of a thrust over its limits that is noise of the rows: it is clipped, the rest yields by the weights",
+        unit="N",
+        why="twice the noise of a thrust in calm air; at the reach 1 N of a rear thrust is 3 N of push",
+        low=0.0,
+        high=10.0,
+    )
     tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
     tilt_rate_1_s: float = _poles(
         12.0,

@@ -31,6 +31,12 @@ class ProgramData:
         self._row_of, self._column_of = pattern.row, pattern.col
         self._size = len(problem.variable_names)
 
+    @property
+    def beyond_limits(self) -> bool:
+        """Whether the thrusts without limits pass a thrust limit, by noise or by more."""
+        n = len(self.free)
+        return bool((self.free < self.lower[:n]).any() or (self.free > self.upper[:n]).any())
+
     def hessian(self) -> np.ndarray:
         """P in full, (variables, variables)."""
         full = np.zeros((self._size, self._size))

@@ -151,7 +151,7 @@ class TickReplay:
             limit_cost=tuple(paid),
             limit_rows=self.limit_values([limit.name for limit in limits], thrusts),
             limit_ranges=self._limit_ranges([limit.name for limit in limits]),
-            unallocated_wrench=effectiveness @ (data.free - thrusts) if limits else np.zeros(6),
+            unallocated_wrench=effectiveness @ (data.free - thrusts) * (bool(limits) or data.beyond_limits),
         )
 
     def limit_values(self, names: Sequence[str], thrusts: np.ndarray) -> tuple[LimitValue, ...]:

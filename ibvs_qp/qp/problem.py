@@ -11,6 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from ibvs_qp.limits.limit import Limit
+from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.qp.row_check import check_rows
@@ -76,6 +77,16 @@ class QpProblem:
     Accelerations are eliminated, soft equalities live in P: small, dense, well scaled (the form that keeps the
     tail of ADMM iterations short). P and A keep one sparsity for every phase, line count and fault.
 
+    The rows' noise, 0.25 to 0.5 N of thrust, passes a limit in every second tick of a push near its reach. The weights
+    would take all of it from the lightest row, 3 N of push for 1 N of a rear thrust. So the least squares go about
+    thrusts :math:`\bar u` that are clipped within delta of `limits.thrust_noise_n`,
+
+    .. math:: \bar u = u_0 + \operatorname{clip}_{\pm \delta} \big( \operatorname{clip}_{[l, u]}(u_0) - u_0 \big),
+        \quad q = -P \bar u,
+
+    with the thrusts u_0 without limits: an excess up to delta costs every row its share, as in a clipped law, and the
+    weights decide about the rest.
+
     Attributes:
         variable_names: Names of the entries of x.
         task_names: Name and unit of every task row.
@@ -104,6 +115,8 @@ class QpProblem:
         # OSQP may take a program that is not convex for solved: the root of a negative weight is NaN, which no solver
         # accepts, and `program_faults` names the row.
         hessian, gradient = achieved.least_squares(ca.if_else(weights >= 0.0, weights, ca.sqrt(weights)), targets)
+        free = _unlimited_thrusts(hessian, gradient)
+        gradient -= hessian @ _noise_beyond_limits(model, free)
         slack_weights = [float(self.limit_rows[place].slack_weight or 0.0) for place in soft]
         p = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(ca.DM(slack_weights)))) if m else hessian)
         q = ca.vertcat(gradient, ca.DM.zeros(m))
@@ -117,7 +130,7 @@ class QpProblem:
         upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - bounds.constant
 
         self.values = [p.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
-        self.values.append(ca.vertcat(_unlimited_thrusts(hessian, gradient), ca.DM.zeros(m)))
+        self.values.append(ca.vertcat(free, ca.DM.zeros(m)))
         point = ca.vertcat(stack(model.signals.inputs), stack(model.signals.states))
         self._at = [point, model.thrust]
         self.report = ArrayFunction("task_report", self._at, [achieved.at(model.thrust), targets, weights])
@@ -144,6 +157,14 @@ def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:
     """Thrusts without any limit, by Cholesky factors [N], (n,)."""
     root = ca.chol(hessian)
     return ca.solve(root, ca.solve(root.T, -gradient))
+
+
+def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
+    """Way from thrusts to their limits, at most `limits.thrust_noise_n` [N], (n,)."""
+    most = model.config.limits.thrust_noise_n
+    if not model.config.thrust_rows or most == 0.0:
+        return ca.SX(model.rotors, 1)
+    return clamp(clamp(thrusts, model.thrust_lower, model.thrust_upper) - thrusts, -most, most)
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

@@ -12,9 +12,9 @@ from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].
 FORCE_INTEGRAL_BOUND = 8.0
-#: The filter adds the part of the last target that limits removed, at most [N]: noise of a push at its reach, 0.2 N of
-#: thrust times 5. More would put the full weight of an unreachable push on the other rows.
-PUSH_DEFICIT_BOUND = 1.0
+#: The filter adds the part of the last target that limits removed, at most [N]: noise of a push at its reach. More
+#: would put the full weight of an unreachable push on the other rows.
+PUSH_DEFICIT_BOUND = 0.4
 #: And at most this ratio to the wrench given up [N per N or N m]: a limit that is just touched changes nothing at once.
 PUSH_DEFICIT_RATIO = 4.0
 

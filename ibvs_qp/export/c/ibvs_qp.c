@@ -39,6 +39,16 @@ static void evaluate(ibvs_controller *c) {
   ibvs_tick(arguments, outputs);
 }
 
+/* Whether the thrusts without limits pass a thrust limit, by noise or by more. */
+static bool beyond_limits(const ibvs_program *program) {
+  for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
+    if (program->unlimited[i] < program->lower[i] || program->unlimited[i] > program->upper[i]) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Thrusts within the window, and their report. */
 static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real thrusts[IBVS_ROTORS], bool limited,
                    ibvs_command *command) {
@@ -127,7 +137,7 @@ void ibvs_step_packed(ibvs_controller *c, ibvs_command *command) {
       const ibvs_real multiplier = solution.multipliers[i];
       command->multipliers[i] = r_fabs(multiplier) > IBVS_ACTIVE_MULTIPLIER ? multiplier : 0;
     }
-    finish(c, c->program.unlimited, solution.thrusts, solution.limited, command);
+    finish(c, c->program.unlimited, solution.thrusts, solution.limited || beyond_limits(&c->program), command);
     return;
   }
   fall_back(c, command);

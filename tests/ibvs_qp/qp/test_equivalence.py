@@ -11,13 +11,14 @@ import pytest
 from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, measured, pack, random_tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 from small_vehicle import SmallVehicle
 
 from allocation import control_effectiveness
 from allocation.geometry import TAROT_T960
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
-from ibvs_qp.config import ControllerConfig, Gains, Weights
+from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, Weights
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
@@ -28,6 +29,7 @@ from ibvs_qp.qp.explain import active_limits
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from ibvs_qp.qp.solution import AcceptedSolution
 
+RNG = np.random.default_rng
 LAST = np.array([11.0, 12.0, 10.5, 11.5, 12.5, 11.2])
 
 
@@ -306,7 +308,9 @@ def test_the_scale_of_the_plane_does_not_matter() -> None:
 
 
 def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
-    controller, limit = HybridController(), np.full(6, CEILING)
+    """Without noise at the limits, which moves the centre of the least squares."""
+    controller = HybridController(ControllerConfig(limits=LimitSettings(thrust_noise_n=0.0)))
+    limit = np.full(6, CEILING)
     limit[3] = 9.0  # below hover: this rotor is missed
     vehicle = SmallVehicle(controller.config)
     for _ in range(20):
@@ -332,6 +336,51 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
     lost = control_effectiveness(controller.config.vehicle.geometry) @ (solution[0][:6] - command.thrusts)
     assert np.abs(lost).max() > 0.5
     np.testing.assert_allclose(command.unallocated_wrench, lost, atol=0.01)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("beyond", [0.2, 0.5, 0.9, 3.0])
+@pytest.mark.parametrize("low", [True, False])
+def test_noise_at_a_thrust_limit_is_clipped_and_the_weights_decide_about_the_rest(
+    noise: float, beyond: float, low: bool
+) -> None:
+    """Two rotors without limits lie that far beyond a common one."""
+    limits = LimitSettings(thrust_noise_n=noise)
+    controller, tick = HybridController(ControllerConfig(barriers=False, limits=limits)), random_tick(RNG(3), 2)
+    controller.reset()
+    pack(controller, *tick, share=0.6, last=LAST)
+    free = controller.engine.data.free.copy()
+    order = np.sort(free)
+    bound = order[1] + beyond if low else order[-2] - beyond
+    window = (bound, 1e3) if low else (-1e3, bound)
+    controller.reset()
+    pack(controller, *tick, share=0.6, last=LAST, window=window)
+    np.testing.assert_allclose(controller.engine.data.free, free, atol=1e-9)
+    p, *_ = dense(controller)
+    excess = np.clip(free, *window) - free
+    centre = free + np.clip(excess, -noise, noise)
+    root = np.linalg.cholesky(p[:6, :6]).T
+    expected = lsq_linear(root, root @ centre, window, method="bvls", tol=1e-14).x
+    np.testing.assert_allclose(exact_thrusts(controller), expected, atol=1e-6)
+    from_clipped = np.abs(np.clip(free, *window) - expected).max()
+    assert (from_clipped < 1e-6) == (np.abs(excess).max() <= noise)
+
+
+def test_a_clipped_thrust_is_reported_as_given_up() -> None:
+    """The rotor's share of the hover, less 0.3 N."""
+    controller = HybridController()
+    vehicle = SmallVehicle(controller.config)
+    for _ in range(20):
+        command = controller.step(vehicle.measure(), Reference(standoff=0.1))
+        vehicle.fly(command.thrusts)
+    limit = np.full(6, CEILING)
+    limit[3] = command.thrusts[3] - 0.3
+    command = controller.step(vehicle.measure(thrust_max=limit), Reference(standoff=0.1))
+    assert command.thrusts[3] == pytest.approx(limit[3], abs=1e-4) and not command.active_limits
+    free = controller.engine.data.free
+    lost = control_effectiveness(controller.config.vehicle.geometry) @ (free - command.thrusts)
+    assert free[3] - limit[3] > 0.2 and np.abs(lost).max() > 0.05
+    np.testing.assert_allclose(command.unallocated_wrench, lost, atol=1e-9)
 
 
 def optimal_cost(controller: HybridController, row: int, side: str, change: float) -> float:

@@ -77,9 +77,9 @@ def test_a_push_beyond_reach_is_given_up_and_nothing_else(reach_check: bool) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("push", "least"), [(29.5, 28.8), (30.0, 28.85), (35.0, 29.1)])
+@pytest.mark.parametrize(("push", "least"), [(29.5, 29.4), (30.0, 29.85), (35.0, 29.6)])
 def test_a_push_at_the_reach_costs_no_tilt(push: float, least: float) -> None:
-    """The noise of all other rows comes out of the push, 1 N; a law that clips tilts by 1.1 deg for 35 N."""
+    """Noise of all other rows is clipped; a law that clips everything tilts by 1 deg for 35 N."""
     trace = press(push, 0.3, reach_check=False)
     ticks = settled(trace)
     delivered, turned = float(trace.push_true[ticks].mean()), np.degrees(np.abs(trace.euler[ticks])).max(axis=0)
