@@ -13,15 +13,14 @@ class ProgramData:
 
     Attributes:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
-        unlimited: Solution of the same step without any limit, (variables,).
-        free: Its thrusts [N], (n,).
+        unlimited: Solution of the same program without any row of A, (variables,).
+        free: Thrusts without limits [N], (n,); `unlimited` less noise at the limits.
         further: Further values of the problem, in their order.
         point: Inputs and states of the step; `inputs` are views of it by name.
     """
 
     def __init__(self, problem: QpProblem, step: StepFunction) -> None:
-        self.p, self.q, self.a, self.lower, self.upper, self.unlimited, *self.further = step.extra
-        self.free = self.unlimited[: problem.model.rotors]
+        self.p, self.q, self.a, self.lower, self.upper, self.unlimited, self.free, *self.further = step.extra
         self._step = step  # owns the memory that the compiled function writes
         self.point, self.inputs = step.point, step.inputs
         self._problem = problem

@@ -91,8 +91,8 @@ class QpProblem:
         variable_names: Names of the entries of x.
         task_names: Name and unit of every task row.
         row_names: Names of the rows of A.
-        values: Expressions of the non-zeros of P (upper triangle), q, A, l, u, and of the solution without any limit;
-            extra results of the step function.
+        values: Expressions of the non-zeros of P (upper triangle), q, A, l, u, of the program's solution without A, and
+            of the thrusts without limits; extra results of the step function.
         report: Function of point (inputs and states) and thrusts: achieved and target values of every task row, and
             weights, (rows,) each.
         row_slack: Column of every row's slack in x, -1 where the row is hard, (rows,).
@@ -116,7 +116,8 @@ class QpProblem:
         # accepts, and `program_faults` names the row.
         hessian, gradient = achieved.least_squares(ca.if_else(weights >= 0.0, weights, ca.sqrt(weights)), targets)
         free = _unlimited_thrusts(hessian, gradient)
-        gradient -= hessian @ _noise_beyond_limits(model, free)
+        noise = _noise_beyond_limits(model, free)
+        gradient -= hessian @ noise
         slack_weights = [float(self.limit_rows[place].slack_weight or 0.0) for place in soft]
         p = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(ca.DM(slack_weights)))) if m else hessian)
         q = ca.vertcat(gradient, ca.DM.zeros(m))
@@ -130,7 +131,7 @@ class QpProblem:
         upper = ca.vertcat(*(row.upper for row in self.limit_rows)) - bounds.constant
 
         self.values = [p.nz[:], ca.densify(q), a.nz[:], ca.densify(lower), ca.densify(upper)]
-        self.values.append(ca.vertcat(free, ca.DM.zeros(m)))
+        self.values += [ca.vertcat(free + noise, ca.DM.zeros(m)), free]
         point = ca.vertcat(stack(model.signals.inputs), stack(model.signals.states))
         self._at = [point, model.thrust]
         self.report = ArrayFunction("task_report", self._at, [achieved.at(model.thrust), targets, weights])

@@ -32,7 +32,8 @@ static void evaluate(ibvs_controller *c) {
   const ibvs_real *arguments[] = {c->inputs, c->states};
   ibvs_program *program = &c->program;
   ibvs_real *outputs[] = {c->next_states, c->finite,      c->results,         program->p,   program->q,      program->a,
-                          program->lower, program->upper, program->unlimited, c->line_rows, c->line_targets, c->secondary};
+                          program->lower, program->upper, program->unlimited, c->free,       c->line_rows, c->line_targets,
+                          c->secondary};
   if (isfinite(c->finite[0])) { /* the states stay where one of the next ones is not finite */
     memcpy(c->states, c->next_states, sizeof c->states);
   }
@@ -40,9 +41,9 @@ static void evaluate(ibvs_controller *c) {
 }
 
 /* Whether the thrusts without limits pass a thrust limit, by noise or by more. */
-static bool beyond_limits(const ibvs_program *program) {
+static bool beyond_limits(const ibvs_controller *c) {
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
-    if (program->unlimited[i] < program->lower[i] || program->unlimited[i] > program->upper[i]) {
+    if (c->free[i] < c->program.lower[i] || c->free[i] > c->program.upper[i]) {
       return true;
     }
   }
@@ -137,7 +138,7 @@ void ibvs_step_packed(ibvs_controller *c, ibvs_command *command) {
       const ibvs_real multiplier = solution.multipliers[i];
       command->multipliers[i] = r_fabs(multiplier) > IBVS_ACTIVE_MULTIPLIER ? multiplier : 0;
     }
-    finish(c, c->program.unlimited, solution.thrusts, solution.limited || beyond_limits(&c->program), command);
+    finish(c, c->free, solution.thrusts, solution.limited || beyond_limits(c), command);
     return;
   }
   fall_back(c, command);

@@ -136,6 +136,7 @@ typedef struct {
   /* tick */
   int64_t tick_ns;
   ibvs_real inputs[IBVS_INPUTS], states[IBVS_STATES], next_states[IBVS_STATES], finite[1], results[IBVS_RESULTS];
+  ibvs_real free[IBVS_ROTORS]; /* thrusts without limits */
   ibvs_real line_rows[6 * (IBVS_LINES + 1)], line_targets[IBVS_LINES + 1], secondary[6];
   /* solution and command */
   ibvs_program program;

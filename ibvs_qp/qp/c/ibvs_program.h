@@ -21,7 +21,7 @@ typedef enum {
 /* One instance. */
 typedef struct {
   ibvs_real p[IBVS_P_NONZEROS], q[IBVS_VARIABLES], a[IBVS_A_NONZEROS], lower[IBVS_ROWS], upper[IBVS_ROWS];
-  ibvs_real unlimited[IBVS_VARIABLES]; /* solution without any row */
+  ibvs_real unlimited[IBVS_VARIABLES]; /* solution without any row, noise at the limits clipped */
   ibvs_solver_workspace solver;
   bool ready, limited;                 /* limited: a row was active at the last solution */
 } ibvs_program;
