@@ -16,7 +16,7 @@ SHELL = Path(__file__).parent / "c"
 #: Its part that only Python needs.
 FOR_PYTHON = "python_solve.c"
 #: Changes of OSQP's active set at most.
-PASSES = 10
+PASSES = 20
 
 
 def write_program(folder: Path, problem: QpProblem, settings: SolverSettings, single: bool = False) -> None:
