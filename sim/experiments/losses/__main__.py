@@ -42,6 +42,7 @@ def main() -> int:
     counts = Counter((each.opponent, each.outcome) for each in found)
     rows = [(name, *(str(counts[name, each]) for each in Outcome)) for name in sorted({name for name, _ in counts})]
     console.print(terminal_table(("opponent", *(each.value for each in Outcome)), rows, text=("opponent",)))
+    console.print(terminal_table(("law", "variant", "step, median, µs"), _times(flown), text=("law", "variant")))
     errors = flown.filter(broken)
     for row in errors.to_dicts():
         words = f"{row['experiment']}, {row['law']}, {row['variant']}, seed {row['seed']}: {row['reason']}"
@@ -52,6 +53,14 @@ def main() -> int:
     if interrupted:
         return 130
     return int(len(lost) > MOST_LOST or len(flown) < len(runs) or len(errors) > 0)
+
+
+def _times(flown: pl.DataFrame) -> list[tuple[str, ...]]:
+    """Law, variant and median time of their steps [µs]."""
+    if flown.is_empty():
+        return []
+    times = flown.group_by("law", "variant").agg(pl.col("step_us.p50").median()).sort("law", "variant")
+    return [(law, variant, f"{time:.0f}") for law, variant, time in times.rows()]
 
 
 if __name__ == "__main__":

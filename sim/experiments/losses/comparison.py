@@ -70,11 +70,16 @@ class Comparison:
 def comparisons(table: pl.DataFrame) -> list[Comparison]:
     """Every figure of every cell of the QP's flights against every opponent in it.
 
+    An opponent that flies like an earlier one, because their gains differ only where the cell has no use for them, is
+    no further comparison.
+
     Args:
         table: Flights of `sim.experiments.losses.flights.runs_of`.
     """
     found = []
     for key, rows in split(table, ("experiment",)):
+        flown: list[pl.DataFrame] = []
+        figures = {"seed", "completed"} | {each.metric for each in experiment(key["experiment"]).columns if each.better}
         for (law, variant), theirs in rows.group_by("law", "variant", maintain_order=True):
             base = base_of(str(variant))
             if law == "qp" and not str(variant).endswith("mpc"):
@@ -82,6 +87,10 @@ def comparisons(table: pl.DataFrame) -> list[Comparison]:
             mine = rows.filter((pl.col("law") == "qp") & (pl.col("variant") == base))
             if mine.is_empty():
                 continue
+            flights = theirs.sort("seed").select(pl.lit(base), *sorted(figures & set(theirs.columns)))
+            if any(flights.equals(each) for each in flown):
+                continue
+            flown.append(flights)
             name = str(variant) if law == "qp" else f"analytic law, {variant}"
             found += _against(key["experiment"], parameters(key), name, mine, theirs)
     return found

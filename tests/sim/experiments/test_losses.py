@@ -63,6 +63,16 @@ def test_a_comparison_is_lost_when_the_whole_interval_is_worse_than_what_matters
         assert found.outcome is outcome
 
 
+def test_an_opponent_that_flies_like_another_one_is_counted_once() -> None:
+    """Both laws share all gains but three, so "shared-gains" often is "standard" again."""
+    same = [0.1] * 10
+    flights = [rows("qp", "standard", [0.3] * 10), rows("paper", "standard", same), rows("paper", "shared-gains", same)]
+    opponents = {each.opponent for each in comparisons(pl.concat(flights))}
+    assert opponents == {"analytic law, standard"}
+    flights[2] = rows("paper", "shared-gains", [*same[:9], 0.1001])
+    assert len({each.opponent for each in comparisons(pl.concat(flights))}) == 2
+
+
 def test_one_bad_seed_of_ten_decides_nothing() -> None:
     values = [0.1 + 0.01 * seed for seed in range(10)]
     assert compared(values=[values[0] - 5.0, *values[1:]])["push error"].outcome is Outcome.NEITHER
