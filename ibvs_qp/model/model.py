@@ -191,7 +191,7 @@ class Model:
         low, high, floor, ceiling = (
             signals.input(f"thrust_{name}", count) for name in "low high floor ceiling".split()
         )
-        self.thrust_limits = low, high
+        self.thrust_limits, self.thrust_box = (low, high), (floor, ceiling)
         step = signals.input("thrust_step")
         self.thrust_lower, self.thrust_upper = thrust_window(self.last_thrust, low, high, step, floor, ceiling)
         self.extrapolated_thrust = ca.fmin(ca.fmax(self.last_thrust + change, self.thrust_lower), self.thrust_upper)

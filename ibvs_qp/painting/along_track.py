@@ -107,20 +107,20 @@ class AlongTrack:
         return np.concatenate((prior, u)), np.concatenate((after, after))
 
     @property
-    def moved(self) -> float:
-        """From the beginning of the stroke to the tip, along u [m]."""
-        return self.u - self._began
-
-    @property
     def began(self) -> float:
         """Where the stroke began, u [m]; corrections on the way belong to its beginning and to the odometer."""
         share = self._began_variance / (self._began_variance + self._way_variance + EDGE_STD**2)
-        return self._began + share * (self.moved - self._way)
+        return self._began + share * (self.u - self._began - self._way)
+
+    @property
+    def moved(self) -> float:
+        """From the beginning of the stroke to the tip, along u [m]."""
+        return self.u - self.began
 
     @property
     def stroke_length(self) -> float:
         """Length of the stroke so far [m]."""
-        return abs(self.u - self.began)
+        return abs(self.moved)
 
     @property
     def length_deviation(self) -> float:

@@ -440,17 +440,18 @@ class Painter(Navigation):
 
     def _doubt(self) -> str:
         """Why the stroke that has ended is not claimed: its length or place as estimated, or too little known."""
-        length, asked, goal = self._longest + self._behind, self.config.stroke_m, self._stroke_goal()
+        painted, asked, goal = self._longest + self._behind, self.config.stroke_m, self._stroke_goal()
         if self._along_line.line is None and self._along.deviation > CERTAIN_LENGTH_M:
             known = self._along.deviation
             return f"row {self.row} ended by the odometer, its length is known to {known * 1e3:.0f} mm"
-        error, known = self._along.stroke_length - asked, self._along.length_deviation
-        # The greatest of many estimates errs towards more: no margin.
-        if abs(error) + known > LENGTH_TOLERANCE_M or length - asked > LENGTH_TOLERANCE_M:
+        ended, known = self._along.stroke_length, self._along.length_deviation
+        if abs(ended - asked) + known > LENGTH_TOLERANCE_M:
             return (
-                f"row {self.row} is {length * 1e3:.0f} mm long, known to {known * 1e3:.1f} mm, "
+                f"row {self.row} is {ended * 1e3:.0f} mm long, known to {known * 1e3:.1f} mm, "
                 f"{asked * 1e3:.0f} mm were asked"
             )
+        if painted - asked > LENGTH_TOLERANCE_M:  # the greatest of many estimates errs towards more: no margin
+            return f"row {self.row} is painted over {painted * 1e3:.0f} mm, {asked * 1e3:.0f} mm were asked"
         if (slip := self._along.slip) > self.config.gates.stop_m:
             return f"row {self.row} met an edge {slip * 1e3:.0f} mm from where the odometer expected it"
         # The brush covers half its width from both sides; beyond an end there is no other side.

@@ -27,7 +27,7 @@ OUTCOMES = {
 class QpEngine:
     """OSQP at every tick; DAQP in the same tick where OSQP's answer fails the acceptance test.
 
-    OSQP starts from the last solution, after a tick without an active limit from this tick's solution without limits.
+    OSQP starts from the last solution, after a tick without an active limit from this tick's solution without rows.
 
     Attributes:
         data: Values of the program.

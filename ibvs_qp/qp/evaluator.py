@@ -14,7 +14,7 @@ class ProgramData:
     Attributes:
         p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
         unlimited: Solution of the same program without any row of A, (variables,).
-        free: Thrusts without limits [N], (n,); `unlimited` less noise at the limits.
+        free: Thrusts without limits [N], (n,): `unlimited` before noise at the limits is clipped.
         further: Further values of the problem, in their order.
         point: Inputs and states of the step; `inputs` are views of it by name.
     """

@@ -58,6 +58,8 @@ class Explanation:
             zero for a hard one, `limit_rows` their bounds and values, and `limit_ranges` how far their prices hold, in
             the same order.
         unallocated_wrench: Wrench of the same tick without limits minus the wrench [N, N m], (6,).
+        clipped: Part of the thrusts without limits that is clipped as noise (`limits.thrust_noise_n`) [N], (n,). Prices
+            and ranges are of the program after that: its cost is about the clipped thrusts.
     """
 
     thrusts: np.ndarray
@@ -70,6 +72,7 @@ class Explanation:
     limit_rows: tuple[LimitValue, ...]
     limit_ranges: tuple[LimitRange, ...]
     unallocated_wrench: np.ndarray
+    clipped: np.ndarray
 
 
 def task_reports(problem: QpProblem, data: ProgramData, thrusts: np.ndarray) -> TaskReports:
@@ -152,6 +155,7 @@ class TickReplay:
             limit_rows=self.limit_values([limit.name for limit in limits], thrusts),
             limit_ranges=self._limit_ranges([limit.name for limit in limits]),
             unallocated_wrench=effectiveness @ (data.free - thrusts) * (bool(limits) or data.beyond_limits),
+            clipped=data.unlimited[: len(thrusts)] - data.free,
         )
 
     def limit_values(self, names: Sequence[str], thrusts: np.ndarray) -> tuple[LimitValue, ...]:

@@ -19,6 +19,9 @@ from ibvs_qp.symbolic.bound_function import ArrayFunction
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
 
+#: More rotors than this have directions without a wrench.
+REDUNDANT_ABOVE = 6
+
 
 class ProgramPatterns(Protocol):
     """Sparsity of a program: upper triangle of P, and A; enough for a solver."""
@@ -77,15 +80,16 @@ class QpProblem:
     Accelerations are eliminated, soft equalities live in P: small, dense, well scaled (the form that keeps the
     tail of ADMM iterations short). P and A keep one sparsity for every phase, line count and fault.
 
-    The rows' noise, 0.25 to 0.5 N of thrust, passes a limit in every second tick of a push near its reach. The weights
-    would take all of it from the lightest row, 3 N of push for 1 N of a rear thrust. So the least squares go about
-    thrusts :math:`\bar u` that are clipped within delta of `limits.thrust_noise_n`,
+    A push near its reach runs rotors at their limits, and the noise of all rows, 0.25 N of thrust, passes these limits.
+    By the weights the push, the lightest row, would pay for all of it. So in contact the least squares go about thrusts
+    :math:`\bar u` that are clipped within delta of `limits.thrust_noise_n`,
 
-    .. math:: \bar u = u_0 + \operatorname{clip}_{\pm \delta} \big( \operatorname{clip}_{[l, u]}(u_0) - u_0 \big),
+    .. math::
+        \bar u = u_0 + \lambda \operatorname{clip}_{\pm \delta} \big( \operatorname{clip}_{[l, u]}(u_0) - u_0 \big),
         \quad q = -P \bar u,
 
-    with the thrusts u_0 without limits: an excess up to delta costs every row its share, as in a clipped law, and the
-    weights decide about the rest.
+    with the thrusts u_0 without limits and the vehicle's own limits l and u: an excess up to delta costs every row its
+    share, as in a clipped law, and the weights decide about the rest. `_noise_beyond_limits` has the exceptions.
 
     Attributes:
         variable_names: Names of the entries of x.
@@ -161,11 +165,17 @@ def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:
 
 
 def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
-    """Way from thrusts to their limits, at most `limits.thrust_noise_n` [N], (n,)."""
+    """Part of the way from thrusts to the vehicle's own limits that is clipped [N], (n,).
+
+    None for a rotor whose limit is reported (a weak one, say), where an error would last, and none with redundant
+    rotors, which give noise up at no cost of the wrench.
+    """
     most = model.config.limits.thrust_noise_n
-    if not model.config.thrust_rows or most == 0.0:
+    if not model.config.thrust_rows or most == 0.0 or model.rotors > REDUNDANT_ABOVE:
         return ca.SX(model.rotors, 1)
-    return clamp(clamp(thrusts, model.thrust_lower, model.thrust_upper) - thrusts, -most, most)
+    (low, high), (floor, ceiling) = model.thrust_limits, model.thrust_box
+    own = ca.logic_and(low <= floor, high >= ceiling)
+    return model.contact_weight * own * clamp(clamp(thrusts, floor, ceiling) - thrusts, -most, most)
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

@@ -65,7 +65,7 @@ class PushTask(Task):
         """Target behind the filter [N]: a limit that noise reaches for a tick does not lower the push of the next.
 
         The part removed is last target minus last command, with the present disturbance; the wrench given up is zero
-        without an active limit.
+        within the limits.
         """
         row, signals, filter_s = model.force_along_normal, model.signals, model.gains.push_filter_s
         missing = signals.state("push_target") - model.at(row, model.acceleration_commanded)

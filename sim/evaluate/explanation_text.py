@@ -30,6 +30,8 @@ _REDUCED_N = 1e-3
 _NO_BOUND = 9e3
 #: Angles of a trim below this are not shown [deg].
 _NO_TRIM_DEG = 0.05
+#: Noise clipped at the limits below this is not mentioned [N].
+_NOISE_N = 5e-3
 #: Violations of a limit below this are rounding, in the row's unit.
 _ROUNDING = 1e-6
 
@@ -106,8 +108,10 @@ def _tasks(explanation: Explanation) -> Any:
 
 
 def _limits(explanation: Explanation) -> list[Any]:
+    noise = float(np.abs(explanation.clipped).max())
+    clipped = f"Noise of up to {noise:.2f} N is clipped at the limits of the thrusts." if noise >= _NOISE_N else ""
     if not explanation.active_limits:
-        return ["No limit is active: the thrusts are the weighted least-squares solution."]
+        return [f"No limit is active: the thrusts are the weighted least-squares solution. {clipped}".rstrip()]
     rows, prices = [], []
     every = (explanation.active_limits, explanation.limit_rows, explanation.limit_cost, explanation.limit_ranges)
     for limit, row, cost, span in zip(*every, strict=True):
@@ -120,13 +124,13 @@ def _limits(explanation: Explanation) -> list[Any]:
         changes = f"{span.change_low:+.3g} to {span.change_high:+.3g}"
         prices.append((limit.name, _number(limit.price), limit.unit, changes, fall, span.until))
     words = (
-        "Price: the derivative of the cost by the bound, the multiplier. It falls as the bound yields, so the cost "
-        "falls by less than price times change: by the amount stated if the bound yields to the end of the range. Over "
-        "the range the same limits are active; at its end a limit is released or becomes active. "
+        "Price: the derivative of the program's cost by the bound, the multiplier. It falls as the bound yields, so the "
+        "cost falls by less than price times change: by the amount stated if the bound yields to the end of the range. "
+        "Over the range the same limits are active; at its end a limit is released or becomes active. "
     )
     if explanation.slack_cost > 0.0:
         words += f"Slack takes {_percent(explanation.slack_cost)} of the cost of {explanation.total_cost:.3g}. "
-    words += "The cost has no unit: weights and slack weights are per squared unit of the row."
+    words += f"The cost has no unit: weights and slack weights are per squared unit of the row. {clipped}".rstrip()
     headings = ("limit", "side", "bound", "value", "slack", "unit", "cost of slack")
     title = "Active limits, highest price first"
     price_headings = ("limit", "price per unit", "unit", "range of changes", "cost falls by", "until")

@@ -76,8 +76,8 @@ class Program:
     rows: np.ndarray  # A, (rows, variables)
     lower: np.ndarray  # l, (rows,)
     upper: np.ndarray  # h, (rows,)
-    free: np.ndarray  # thrusts of the optimum without limits [N], (n,)
-    limited: bool  # whether this optimum violates a limit
+    free: np.ndarray  # thrusts without limits [N], (n,)
+    limited: bool  # whether they violate a limit
     arrays: tuple[np.ndarray, ...]  # the engine's own data, for `shipped_solver`
 
 
@@ -100,15 +100,14 @@ def record_program(controller: HybridController) -> Program:
     data = controller.engine.data
     hessian, rows, q = data.hessian(), data.rows(), data.q.copy()
     lower, upper = data.lower.copy(), data.upper.copy()
-    optimum = np.linalg.solve(hessian, -q)
-    at = rows @ optimum
+    at = rows[:, : len(data.free)] @ data.free
     return Program(
         hessian=hessian,
         q=q,
         rows=rows,
         lower=lower,
         upper=upper,
-        free=optimum[: controller.problem.model.rotors],
+        free=data.free.copy(),
         limited=bool(((at < lower) | (at > upper)).any()),
         arrays=tuple(getattr(data, name).copy() for name in _ARRAYS),
     )

@@ -59,7 +59,7 @@ class SampleMonitor:
                 faults[fault] = f"{1e-6 * (now - stamp):.0f} ms old, limit {1e-6 * oldest:.0f} ms"
             elif now - self._first_ns > latest and (tick.has_camera or not camera):
                 faults[fault] = "none yet"
-        if tick.plane_doubt and Fault.PLANE_STALE in faults:
+        if tick.plane_doubt and Fault.PLANE_STALE in faults and Fault.IMAGE_STALE not in faults:
             faults[Fault.PLANE_STALE] += f"; {tick.plane_doubt}"
         if tick.imu_ns != self._imu_ns:
             self._imu_ns = tick.imu_ns

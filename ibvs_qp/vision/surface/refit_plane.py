@@ -117,9 +117,9 @@ class PlaneRefit:
 
 
 def depth_noise(inverse: np.ndarray) -> float:
-    r"""Noise of single depth samples by the differences of neighbours in a row, whatever the surfaces in the picture.
+    r"""Noise of single depth samples by their second differences along rows, which are zero on every plane.
 
-    .. math:: \sigma = \frac{1.4826}{\sqrt 2} \operatorname{median} \frac{2 |w_k - w_{k+1}|}{w_k + w_{k+1}}
+    .. math:: \sigma = \frac{1.4826}{\sqrt 6} \operatorname{median} \frac{|w_{k-1} - 2 w_k + w_{k+1}|}{w_k}
 
     Args:
         inverse: 1/Z of the samples w [1/m], 0 where absent, (rows, columns).
@@ -127,7 +127,7 @@ def depth_noise(inverse: np.ndarray) -> float:
     Returns:
         Standard deviation, share of depth [-]; 0 without neighbours.
     """
-    left, right = inverse[:, :-1], inverse[:, 1:]
-    both = (left > 0.0) & (right > 0.0)
-    steps = 2.0 * np.abs(left - right)[both] / (left + right)[both]
-    return MAD_TO_SIGMA / math.sqrt(2.0) * median(steps) if steps.size else 0.0
+    left, middle, right = inverse[:, :-2], inverse[:, 1:-1], inverse[:, 2:]
+    there = (left > 0.0) & (middle > 0.0) & (right > 0.0)
+    bends = np.abs(left - 2.0 * middle + right)[there] / middle[there]
+    return MAD_TO_SIGMA / math.sqrt(6.0) * median(bends) if bends.size else 0.0

@@ -516,7 +516,7 @@ def test_a_first_pass_that_was_too_long_is_not_forgiven(monkeypatch) -> None:
     world.stuck_across = False
     monkeypatch.setattr(AlongTrack, "stroke_length", 1.0)
     world.fly(60.0)
-    assert world.painter.failed and world.painter.reason == "row 2 is 1012 mm long, known to 1.4 mm, 1000 mm were asked"
+    assert world.painter.failed and world.painter.reason == "row 2 is painted over 1012 mm, 1000 mm were asked"
 
 
 @pytest.mark.parametrize("stroke", [2, 3])
@@ -535,7 +535,7 @@ def test_a_slide_before_the_beginning_by_a_retouch_is_length(stroke: int, slide:
     world.tip = world.tip + world.to_board(*beyond)
     world.odometer = world.odometer + beyond
     world.fly(100.0)
-    reason = rf"row {stroke} is 101\d mm long, known to \d.\d mm, 1000 mm were asked"
+    reason = rf"row {stroke} is painted over 101\d mm, 1000 mm were asked"
     assert claimed != world.painter.failed
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
@@ -553,7 +553,7 @@ def test_paint_past_an_end_by_a_gust_is_length(end: bool, gust: float, claimed: 
     world.odometer = world.odometer + moved
     world.fly(60.0)
     assert world.painter.finished and claimed != world.painter.failed
-    reason = r"row 1 is 101\d mm long, known to \d.\d mm, 1000 mm were asked"
+    reason = r"row 1 is painted over 101\d mm, 1000 mm were asked"
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
 

@@ -11,9 +11,11 @@ import pytest
 from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, measured, pack, random_tick
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from law_only import evaluate_law
 from scipy.optimize import lsq_linear
 from small_vehicle import SmallVehicle
 
+import ibvs_qp
 from allocation import control_effectiveness
 from allocation.geometry import TAROT_T960
 from ibvs_qp.analytic import analytic_thrusts
@@ -344,7 +346,7 @@ def test_the_price_of_a_limit_is_the_slope_of_the_cost() -> None:
 def test_noise_at_a_thrust_limit_is_clipped_and_the_weights_decide_about_the_rest(
     noise: float, beyond: float, low: bool
 ) -> None:
-    """Two rotors without limits lie that far beyond a common one."""
+    """Two thrusts without limits lie that far beyond a common limit of the vehicle, lambda is 0.6."""
     limits = LimitSettings(thrust_noise_n=noise)
     controller, tick = HybridController(ControllerConfig(barriers=False, limits=limits)), random_tick(RNG(3), 2)
     controller.reset()
@@ -358,28 +360,55 @@ def test_noise_at_a_thrust_limit_is_clipped_and_the_weights_decide_about_the_res
     np.testing.assert_allclose(controller.engine.data.free, free, atol=1e-9)
     p, *_ = dense(controller)
     excess = np.clip(free, *window) - free
-    centre = free + np.clip(excess, -noise, noise)
+    centre = free + 0.6 * np.clip(excess, -noise, noise)
     root = np.linalg.cholesky(p[:6, :6]).T
     expected = lsq_linear(root, root @ centre, window, method="bvls", tol=1e-14).x
     np.testing.assert_allclose(exact_thrusts(controller), expected, atol=1e-6)
-    from_clipped = np.abs(np.clip(free, *window) - expected).max()
-    assert (from_clipped < 1e-6) == (np.abs(excess).max() <= noise)
+    if np.abs(excess).max() <= noise:
+        pack(controller, *tick, share=1.0, last=LAST, window=window)
+        free = controller.engine.data.free
+        if np.abs(np.clip(free, *window) - free).max() <= noise:
+            np.testing.assert_allclose(exact_thrusts(controller), np.clip(free, *window), atol=1e-6)
+
+
+def test_no_noise_is_clipped_off_the_wall_at_a_reported_limit_or_with_redundant_rotors() -> None:
+    config, tick = ControllerConfig(barriers=False), random_tick(RNG(3), 2)
+
+    def centre(config: ControllerConfig, share: float, reported: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Thrusts without limits and the program's centre, one rotor 0.3 N beyond its limit."""
+        controller = HybridController(config)
+        count, data = config.vehicle.geometry.count, controller.engine.data
+        pack(controller, *tick, share=share, last=np.full(count, 11.3))
+        limit = np.full(count, 1e4)
+        limit[0] = data.free[0] - 0.3
+        controller.reset()
+        pack(controller, *tick, share=share, last=np.full(count, 11.3))
+        controller.setpoints.step.inputs["thrust_high"][:] = limit
+        if not reported:
+            controller.setpoints.step.inputs["thrust_ceiling"][:] = limit
+        evaluate_law(controller.setpoints, controller.problem.values)
+        return data.free.copy(), data.unlimited[:count].copy()
+
+    octorotor = replace(config, vehicle=ibvs_qp.preset("octorotor_qp").controller.vehicle)
+    free, clipped = centre(config, 1.0, reported=False)
+    assert free[0] - clipped[0] == pytest.approx(0.3, abs=0.01)
+    for own, share, reported in ((config, 0.0, False), (config, 1.0, True), (octorotor, 1.0, False)):
+        free, same = centre(own, share, reported)
+        np.testing.assert_array_equal(same, free)
 
 
 def test_a_clipped_thrust_is_reported_as_given_up() -> None:
-    """The rotor's share of the hover, less 0.3 N."""
-    controller = HybridController()
-    vehicle = SmallVehicle(controller.config)
-    for _ in range(20):
-        command = controller.step(vehicle.measure(), Reference(standoff=0.1))
+    """A push of 30.5 N without noise, just beyond the reach of 30.4 N."""
+    config = ControllerConfig(reach_check=False)
+    controller, vehicle = HybridController(config), SmallVehicle(config, distance=0.005)
+    reference = Reference(push_force=30.5, standoff=0.02, contact=True, lines=line_references(1))
+    for _ in range(2000):
+        command = controller.step(vehicle.measure(count=1), reference)
         vehicle.fly(command.thrusts)
-    limit = np.full(6, CEILING)
-    limit[3] = command.thrusts[3] - 0.3
-    command = controller.step(vehicle.measure(thrust_max=limit), Reference(standoff=0.1))
-    assert command.thrusts[3] == pytest.approx(limit[3], abs=1e-4) and not command.active_limits
     free = controller.engine.data.free
-    lost = control_effectiveness(controller.config.vehicle.geometry) @ (free - command.thrusts)
-    assert free[3] - limit[3] > 0.2 and np.abs(lost).max() > 0.05
+    lost = control_effectiveness(config.vehicle.geometry) @ (free - command.thrusts)
+    assert not command.active_limits and command.thrusts.min() == pytest.approx(config.vehicle.thrust_min[0], abs=1e-3)
+    assert np.abs(lost).max() > 0.02
     np.testing.assert_allclose(command.unallocated_wrench, lost, atol=1e-9)
 
 

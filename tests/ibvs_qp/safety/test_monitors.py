@@ -201,6 +201,9 @@ def test_a_wall_that_noise_hides_is_lost_with_its_cause() -> None:
     tick = quiet_tick(200, plane_ns=0, plane_doubt="depth scatters")
     assurance.watch(tick, StubResponse())
     assert tick.faults[Fault.PLANE_STALE].endswith(" limit 300 ms; depth scatters")
+    tick = quiet_tick(200, plane_ns=0, image_ns=0, plane_doubt="depth scatters")  # now it is the camera
+    assurance.watch(tick, StubResponse())
+    assert tick.faults[Fault.PLANE_STALE].endswith(" limit 300 ms") and Fault.IMAGE_STALE in tick.faults
 
 
 @pytest.mark.parametrize(("stamp", "fault"), [("imu_ns", Fault.IMU_STALE), ("wrench_ns", Fault.WRENCH_STALE)])

@@ -83,6 +83,7 @@ def explained(rotors: int) -> Explanation:
             for name in names
         ),
         unallocated_wrench=np.zeros(6),
+        clipped=np.zeros(rotors),
     )
 
 
