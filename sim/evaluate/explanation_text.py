@@ -124,9 +124,9 @@ def _limits(explanation: Explanation) -> list[Any]:
         changes = f"{span.change_low:+.3g} to {span.change_high:+.3g}"
         prices.append((limit.name, _number(limit.price), limit.unit, changes, fall, span.until))
     words = (
-        "Price: the derivative of the program's cost by the bound, the multiplier. It falls as the bound yields, so the "
-        "cost falls by less than price times change: by the amount stated if the bound yields to the end of the range. "
-        "Over the range the same limits are active; at its end a limit is released or becomes active. "
+        "Price: the derivative of the program's cost by the bound, the multiplier. It falls as the bound yields, so "
+        "the cost falls by less than price times change: by the amount stated if the bound yields to the end of the "
+        "range. Over the range the same limits are active; at its end a limit is released or becomes active. "
     )
     if explanation.slack_cost > 0.0:
         words += f"Slack takes {_percent(explanation.slack_cost)} of the cost of {explanation.total_cost:.3g}. "
