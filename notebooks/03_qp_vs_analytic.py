@@ -195,7 +195,7 @@ def _(pressed):
     *In fairness:* a push beyond reach is avoidable. Both laws have a reach check that limits the push reference to 97 %
     of the push that the rotors can hold; it is off here. Limits that no check foresees (a gust, a rotor that weakens)
     remain. The flown law has the line rows of the paper. The preset `paper`, with lines at the tip and without the
-    angle row, leans by 1.1 degrees at most in a hold of 8 s at 35 N (`docs/how_it_works/qp.md`).
+    angle row, leans by 0.8 degrees at most in a hold of 8 s at 35 N (`docs/how_it_works/qp.md`).
 
     ## A sloped edge: the cost of the angle rows
 
