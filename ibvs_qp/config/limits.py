@@ -55,7 +55,7 @@ class LimitSettings:
     )
     thrust_noise_n: float = setting(
         0.5,
-        "excess of a thrust over its limits in contact that is noise: it is clipped, the rest yields by the weights",
+        "excess of a thrust over its limits in contact that is noise and clipped; of a larger one, up to 5 times, less",
         unit="N",
         why="twice the noise of a thrust in calm air; at the reach 1 N of a rear thrust is 3 N of push",
         low=0.0,

@@ -21,6 +21,9 @@ from ibvs_qp.tasks.task import Task
 
 #: More rotors than this have directions without a wrench.
 REDUNDANT_ABOVE = 6
+#: Excess over a limit that is no noise, over `limits.thrust_noise_n` [-]: far beyond its reach a push that is clipped
+#: tilts the vehicle.
+NO_NOISE = 5.0
 
 
 class ProgramPatterns(Protocol):
@@ -82,14 +85,14 @@ class QpProblem:
 
     A push near its reach runs rotors at their limits, and the noise of all rows, 0.25 N of thrust, passes these limits.
     By the weights the push, the lightest row, would pay for all of it. So in contact the least squares go about thrusts
-    :math:`\bar u` that are clipped within delta of `limits.thrust_noise_n`,
+    :math:`\bar u` that are clipped within delta, `limits.thrust_noise_n`,
 
     .. math::
-        \bar u = u_0 + \lambda \operatorname{clip}_{\pm \delta} \big( \operatorname{clip}_{[l, u]}(u_0) - u_0 \big),
-        \quad q = -P \bar u,
+        \bar u = u_0 + \lambda\, \psi \big( \operatorname{clip}_{[l, u]}(u_0) - u_0 \big), \quad q = -P \bar u,
 
-    with the thrusts u_0 without limits and the vehicle's own limits l and u: an excess up to delta costs every row its
-    share, as in a clipped law, and the weights decide about the rest. `_noise_beyond_limits` has the exceptions.
+    with the thrusts u_0 without limits and the vehicle's own limits l and u. psi(e) is e up to delta and falls to zero
+    at five times delta, which is no noise: a small excess costs every row its share, as in a clipped law, and the
+    weights decide about a large one. `_noise_beyond_limits` has the exceptions.
 
     Attributes:
         variable_names: Names of the entries of x.
@@ -175,7 +178,9 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
         return ca.SX(model.rotors, 1)
     (low, high), (floor, ceiling) = model.thrust_limits, model.thrust_box
     own = ca.logic_and(low <= floor, high >= ceiling)
-    return model.contact_weight * own * clamp(clamp(thrusts, floor, ceiling) - thrusts, -most, most)
+    way = clamp(thrusts, floor, ceiling) - thrusts
+    fading = (NO_NOISE * most - ca.fabs(way)) / (NO_NOISE - 1.0)
+    return model.contact_weight * own * ca.sign(way) * ca.fmax(ca.fmin(ca.fabs(way), fading), 0.0)
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

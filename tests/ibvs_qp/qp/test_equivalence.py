@@ -360,7 +360,8 @@ def test_noise_at_a_thrust_limit_is_clipped_and_the_weights_decide_about_the_res
     np.testing.assert_allclose(controller.engine.data.free, free, atol=1e-9)
     p, *_ = dense(controller)
     excess = np.clip(free, *window) - free
-    centre = free + 0.6 * np.clip(excess, -noise, noise)
+    fading = np.maximum(5.0 * noise - np.abs(excess), 0.0) / 4.0
+    centre = free + 0.6 * np.sign(excess) * np.minimum(np.abs(excess), fading)
     root = np.linalg.cholesky(p[:6, :6]).T
     expected = lsq_linear(root, root @ centre, window, method="bvls", tol=1e-14).x
     np.testing.assert_allclose(exact_thrusts(controller), expected, atol=1e-6)
