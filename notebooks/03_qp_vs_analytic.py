@@ -159,7 +159,8 @@ def _(saturated):
         "Same flight, same ticks, each law against its own unlimited thrusts. "
         f"Mean over {_late.sum()} limited ticks in contact:\n\n"
         + table(["given up", "push [N]", "height [N]", "roll [N m]", "pitch [N m]", "yaw [N m]"], _rows)
-        + "\n\nThe program gives up *more* push, as its weights specify. Now each law flies its own closed loop:"
+        + "\n\nThe program gives up *more* push, as its weights specify, and clips noise like the law. "
+        "Now each law flies its own closed loop:"
         if _late.any()
         else "At this push no limit is active in contact, and both laws fly alike. Increase the push."
     )
@@ -314,7 +315,7 @@ def _(flight, limits, press, pressed, saturated):
         late = saturated.limited & (saturated.contact_weight > 0.999)
         if late.any():
             qp, law = (np.abs(saturated.wrench_given_up(name)[late]).max(axis=0) for name in ("qp", "paper"))
-            assert qp[2] < 0.5 * law[2] and qp[0] > qp[2]
+            assert qp[2] < 0.8 * law[2] and qp[0] > qp[2]
         if press.push_n > 33.0 and press.hold_s > 3.0:
             assert flight_figures(pressed["QP law"])["greatest change of height in contact [mm]"] < 5.0
 

@@ -179,8 +179,8 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
     (low, high), (floor, ceiling) = model.thrust_limits, model.thrust_box
     own = ca.logic_and(low <= floor, high >= ceiling)
     way = clamp(thrusts, floor, ceiling) - thrusts
-    fading = (NO_NOISE * most - ca.fabs(way)) / (NO_NOISE - 1.0)
-    return model.contact_weight * own * ca.sign(way) * ca.fmax(ca.fmin(ca.fabs(way), fading), 0.0)
+    noise = ca.fmax((NO_NOISE * most - ca.fabs(way)) / (NO_NOISE - 1.0), 0.0)
+    return model.contact_weight * own * clamp(way, -noise, noise)
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:

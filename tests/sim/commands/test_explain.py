@@ -172,7 +172,7 @@ def test_cost_of_slack_has_bound_and_unit(
     assert (
         f"{span.cost_fall:.3g}" in price_line and f"{span.change_high:+.3g}" in price_line and span.until in price_line
     )
-    assert 0.0 < span.cost_fall < limit.price * span.change_high and "derivative of the cost" in text
+    assert 0.0 < span.cost_fall < limit.price * span.change_high and "derivative of the program's cost" in text
     assert "Slack takes" in text and "per squared unit" in text
     (tmp_path / "scene.toml").write_text((folder / "scene.toml").read_text())
     save_log(tmp_path / "log.npz", {"qp": turning(trace, tick, 0.0, pitch=0.3)})
