@@ -186,9 +186,9 @@ def _():
     limits the reference to 97 % of that push. At rest that would be about 29 N. But a slide follows, on a wall whose
     friction has not been measured yet, so $d$ includes the largest sideways friction of a brush, 0.8, and 8.4 N remain
     until the slide has shown less. Without the check, rotor limits are active from the end of the ramp on. The program
-    then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and 18 N (rms) while sliding,
+    then gives up the task with the smallest weight, the push. It ends 4 N short at rest, and 19 N (rms) while sliding,
     because friction needs thrust too. Tilt stays at 0.2 degrees and the tip within 0.9 mm (rms) of its row. The
-    analytic law clips its thrusts. It tilts by 1.3 degrees, beyond the bound of one degree, and pushes 12 N harder.
+    analytic law clips its thrusts. It tilts by 0.8 degrees, and pushes 12 N harder.
     """)
     return
 
@@ -211,7 +211,7 @@ def _():
     mo.md(r"""
     **Reversed priorities: the weight of the push from 0.5 to 5000, at the same 34 N without the check.** The flight
     before has the shipped weight. This one weight decides which task deviates. Now the push reaches 34 N, and height,
-    lines and level flight are given up for it: the tip leaves its row by 16 cm (rms) and then the wall, and the vehicle
+    lines and level flight are given up for it: the tip leaves its row by 15 cm (rms) and then the wall, and the vehicle
     tilts by 6 degrees until the supervisor ends the flight. The multipliers rise from about ten to above ten thousand:
     the cost depends more on a bound when the weight of its effect is larger. The analytic law has no such parameter;
     the geometry decides what the clipped thrusts lose.
