@@ -20,8 +20,8 @@ from ibvs_qp.vision.picture.camera import RgbdCamera
 
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
 _SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
-#: Scatter of depth about the plane up to which its gates hold, share of depth [-]: half of the first gate, 2.5 %; a
-#: RealSense has 0.85 %.
+#: Largest standard deviation of depth about a fitted plane that is sound, share of depth [-]: half of the first gate of
+#: the fit. A RealSense has 0.85 %.
 SOUND_SCATTER = 0.0125
 
 

@@ -125,7 +125,7 @@ def depth_noise(inverse: np.ndarray) -> float:
         inverse: 1/Z of the samples w [1/m], 0 where absent, (rows, columns).
 
     Returns:
-        Standard deviation, share of depth [-]; 0 without neighbours.
+        Standard deviation as a share of depth [-]; 0 where no three samples lie side by side.
     """
     left, middle, right = inverse[:, :-2], inverse[:, 1:-1], inverse[:, 2:]
     there = (left > 0.0) & (middle > 0.0) & (right > 0.0)
