@@ -48,6 +48,7 @@ class Navigation(PhaseMachine):
         self._looked = -math.inf
         self._u_reference = self._v_reference = 0.0  # where the tip should be now [m]
         self._v_target = self.config.edge_margin_m  # where the stroke in progress belongs [m]
+        self._behind = 0.0  # paint of the stroke before its beginning, by a gust or a retouch [m]
 
     def step(self, inputs: PainterInput) -> PaintingCommand:
         """Advance by one tick."""
@@ -117,12 +118,16 @@ class Navigation(PhaseMachine):
         return self._along.begin if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
 
     def _stroke_goal(self) -> float:
-        """Where the stroke in progress ends, u [m]: half the error of its beginning is made up for there."""
+        """Where the stroke in progress ends, u [m].
+
+        Half the error of its beginning is made up for there, and the paint that a gust laid before it.
+        """
         goal = self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
         error = self._along.began - self._stroke_begin()
         if abs(error) > MOST_BEGIN_ERROR_M:
             return goal
-        return goal + clipped(0.5 * error, -MOST_END_SHIFT_M, MOST_END_SHIFT_M)
+        shift = 0.5 * error - self.pattern.travel(self.row) * self._behind
+        return goal + clipped(shift, -MOST_END_SHIFT_M, MOST_END_SHIFT_M)
 
     def _place(self, stroke: int) -> float:
         """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""

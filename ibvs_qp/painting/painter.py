@@ -94,7 +94,6 @@ class Painter(Navigation):
         self._touches = 0  # that were taken back, before the stroke in progress
         self._retouches, self._back_to = 0, math.nan  # of the stroke in progress; u to which the tip goes back [m]
         self._longest = 0.0  # length of the stroke in progress, each pass and overshoot included [m]
-        self._behind = 0.0  # part of it before its beginning, by a gust or a retouch [m]
         self._painted_s = self._lost_s = 0.0  # time of painting, and of it without contact [s]
         self._lost_m = self._lost_at_ends_m = 0.0  # way of the stroke without contact, and of it near its ends [m]
         self._paused = self._follows_end = False

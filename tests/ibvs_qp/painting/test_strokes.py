@@ -540,10 +540,12 @@ def test_a_slide_before_the_beginning_by_a_retouch_is_length(stroke: int, slide:
     assert claimed or re.fullmatch(reason, world.painter.reason), world.painter.reason
 
 
-@pytest.mark.parametrize("end", [False, True])
-@pytest.mark.parametrize(("gust", "claimed"), [(0.006, True), (0.014, False)])
+@pytest.mark.parametrize(
+    ("end", "gust", "claimed"),
+    [(True, 0.006, True), (True, 0.014, False), (False, 0.006, True), (False, 0.012, True), (False, 0.018, False)],
+)
 def test_paint_past_an_end_by_a_gust_is_length(end: bool, gust: float, claimed: bool) -> None:
-    """The tip comes back, and the paint stays."""
+    """The tip comes back, and the paint stays; the end of the stroke makes up for 4 mm of it at its beginning."""
     world = PaintedWall(short(rows=1, stroke_m=1.0))
     world.fly(60.0, until="paint")
     while end and world.tip[0] < 0.998:
