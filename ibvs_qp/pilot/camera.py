@@ -20,9 +20,6 @@ from ibvs_qp.vision.picture.camera import RgbdCamera
 
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.
 _SPARSE = (slice(0, 4096, 16), slice(0, 4096, 16))
-#: Largest standard deviation of depth about a fitted plane that is sound, share of depth [-]: half of the first gate of
-#: the fit. A RealSense has 0.85 %.
-SOUND_SCATTER = 0.0125
 
 
 class CameraInput:
@@ -135,8 +132,8 @@ class CameraInput:
         surface = self.perception_result.plane
         scatter = surface.residual_sigma if surface is not None else 0.0
         self.plane_doubt = ""
-        if scatter > SOUND_SCATTER:
-            sound = f"at most {100.0 * SOUND_SCATTER:.2f} % is sound"
+        if scatter > (most := self._config.vision.plane.sound_scatter):
+            sound = f"at most {100.0 * most:.2f} % is sound"
             self.plane_doubt = f"depth scatters by at least {100.0 * scatter:.1f} % about a plane, {sound}"
         seen = self.perception_result.features
         if seen is not None:

@@ -52,7 +52,7 @@ def stationary_sideways_weight(weights: Weights) -> float:
     """Weight of the sideways velocity row while friction holds the tip: that of height, if larger.
 
     The vehicle swings about a stationary tip, and this row damps the swing. A push beyond reach takes from every row
-    by its weight: at the weight of a sliding vehicle and with stiff velocity gains 35 N make the yaw grow to 2.5 deg.
+    by its weight: at the weight of a sliding vehicle and with stiff velocity gains 40 N make the yaw grow to 2.4 deg.
     """
     return max(weights.velocity, weights.height) if weights.velocity else 0.0
 

@@ -48,6 +48,14 @@ class PlaneConfig(Checked):
     )
     random_seed: int = setting(20, "seed of the hypotheses", low=0, high=2**31 - 1)
 
+    @property
+    def sound_scatter(self) -> float:
+        """Largest noise of a sample with which the surface holds together, share of depth.
+
+        Half of the first gate: outside it lie 5 % of the samples then.
+        """
+        return 0.5 * self.coarse_gate
+
 
 @dataclass(frozen=True, kw_only=True)
 class MaskConfig(Checked):

@@ -15,9 +15,6 @@ from ibvs_qp.vision.surface.estimate import PlaneEstimate, connected_samples, pl
 #: Samples used to judge the spread of residuals; more cost time and change nothing.
 _JUDGED = 400
 _NO_LABELS = np.empty(0, np.uint8)
-#: Noise of single samples over the gate above which noise, not the scene, tears the surface apart [-]: at half the gate
-#: 5 % of the samples lie outside.
-_NOISY = 0.5
 
 
 class PlaneRefit:
@@ -89,7 +86,7 @@ class PlaneRefit:
             count = int(np.count_nonzero(component))
             if count < self._least:
                 noise = depth_noise(flat.reshape(grid.shape))
-                if noise > _NOISY * gate and np.count_nonzero(near) >= self._least:
+                if noise > config.sound_scatter and np.count_nonzero(near) >= self._least:
                     return f"depth scatters by {100.0 * noise:.1f} % from sample to sample: no surface holds together"
                 return "too few samples on the surface"
             solved, plane, normal_matrix_inverse = fit_plane(self._design, flat, component.reshape(-1))

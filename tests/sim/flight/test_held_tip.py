@@ -89,13 +89,13 @@ def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
 
 
 def test_at_the_weight_of_a_sliding_vehicle_it_would(monkeypatch: pytest.MonkeyPatch) -> None:
-    trace = press(35.0, reach_check=False, **FIRM)
+    trace = press(40.0, reach_check=False, **FIRM)
     assert rocking(trace) < 0.5
-    assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
+    assert trace.push_true[held(trace)].mean() >= 0.95 * REACH_N
     monkeypatch.setattr(velocity, "stationary_sideways_weight", lambda weights: weights.velocity)
-    trace = press(35.0, reach_check=False, noise_n=0.0, **FIRM)  # clipped noise does not rock it
+    trace = press(40.0, reach_check=False, **FIRM)
     assert rocking(trace) > 1.0
-    assert trace.push_true[held(trace)].mean() < 0.97 * REACH_N
+    assert trace.push_true[held(trace)].mean() < 0.9 * REACH_N
 
 
 def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
