@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import polars as pl
 import pytest
 
+from sim.experiments.losses.__main__ import main
 from sim.experiments.losses.comparison import Comparison, Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
 
@@ -93,3 +95,16 @@ def test_flights_that_only_the_opponent_completes_are_lost(failed: int, outcome:
     found = compared(values=[0.1] * 10, mine=[seed >= failed for seed in range(10)])
     assert found["flights completed by one law alone"].outcome is outcome
     assert found["flights completed by one law alone"].pairs == failed
+
+
+def test_a_saved_table_prints_the_same_comparisons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    flown = pl.concat((rows("qp", "standard", [0.9] * 10), rows("paper", "box", [0.1] * 10)))
+    flown = flown.with_columns(pl.lit("landed").alias("reason"))
+    monkeypatch.setattr("sim.experiments.losses.__main__.fly_part", lambda *_: (flown, False))
+    printed = []
+    for options in (["--save", str(tmp_path / "kept.parquet")], ["--table", str(tmp_path / "kept.parquet")]):
+        monkeypatch.setattr("sys.argv", ["losses", "friction", *options])
+        assert main() == 1
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1]
+    assert "1 of" in printed[0] and "20 of" in printed[0]
