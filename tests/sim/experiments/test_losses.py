@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import polars as pl
 import pytest
 
-from sim.experiments.losses.__main__ import main
+from sim.experiments.losses.__main__ import main, step_times
 from sim.experiments.losses.comparison import Comparison, Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
 
@@ -107,4 +108,19 @@ def test_a_saved_table_prints_the_same_comparisons(tmp_path: Path, monkeypatch: 
         assert main() == 1
         printed.append(capsys.readouterr().out)
     assert printed[0] == printed[1]
-    assert "1 of" in printed[0] and "20 of" in printed[0]
+    assert "1 of 2 comparisons lost" in printed[0] and "; 20 of" in printed[0]
+
+
+def test_the_times_are_those_of_every_law_in_its_own_slide(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = []
+
+    def fly(scene: object, options: Any, **_: object) -> SimpleNamespace:
+        flown.append((options.law, options.rival, options.seed))
+        return SimpleNamespace(step_us=[len(flown), 100.0 * len(flown), 1e6])
+
+    monkeypatch.setattr("sim.experiments.losses.__main__.fly", fly)
+    names = [("paper", name) for name in ("box", "sequential", "shared-gains", "standard")]
+    names += [("qp", "mpc"), ("qp", "standard")]
+    assert step_times() == [(*name, f"{100 * (place + 1)}") for place, name in enumerate(names)]
+    assert [(law, rival) for law, rival, _ in flown] == [("paper", "")] * 4 + [("qp", "mpc"), ("qp", "")]
+    assert len({seed for *_, seed in flown}) == 1
