@@ -14,27 +14,22 @@ from pathlib import Path
 import numpy as np
 
 from allocation import control_effectiveness
-from ibvs_qp.config.angular_rate import AngularRateSettings
-from ibvs_qp.config.brush import BrushSettings
-from ibvs_qp.config.contact import ContactSettings
-from ibvs_qp.config.contact_margin import require_margin
-from ibvs_qp.config.derived import derive
+from ibvs_qp.config import contact_margin
+from ibvs_qp.config.contact import BrushSettings, ContactSettings, contact_values
 from ibvs_qp.config.errors import out_of_range
-from ibvs_qp.config.from_vehicle import contact_depth, contact_values, limit_values
-from ibvs_qp.config.gain_scaling import LAWS, scaled_gains
-from ibvs_qp.config.gains import Gains
-from ibvs_qp.config.limits import LimitSettings
-from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.config.estimation import AngularRateSettings
+from ibvs_qp.config.gains import LAWS, Gains, Weights, scaled_gains
+from ibvs_qp.config.limits import LimitSettings, limit_values
+from ibvs_qp.config.settings import Checked, choice, derive, dump_toml, load_toml, setting
 from ibvs_qp.config.solver import SolverSettings
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.config.weights import Weights
 
 #: No estimator or filter takes a tick to last longer than this [s]: after a pause they go on from where they were.
 LONGEST_TICK = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class ControllerConfig:
+class ControllerConfig(Checked):
     """Configuration of a controller; the default flies the Tarot T960."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
@@ -85,7 +80,7 @@ class ControllerConfig:
 
     def __post_init__(self) -> None:
         """Derive what follows from the vehicle, and validate: it is fully actuated, and a push can begin."""
-        validate(self)
+        super().__post_init__()
         object.__setattr__(self, "gains", derive(self.gains, scaled_gains(self.vehicle, self.gains_of)))
         object.__setattr__(self, "contact", derive(self.contact, contact_values(self.vehicle)))
         object.__setattr__(self, "limits", derive(self.limits, limit_values(self.vehicle, self.limits.view_margin)))
@@ -93,7 +88,7 @@ class ControllerConfig:
         if (rank := int(np.linalg.matrix_rank(matrix))) < len(matrix):
             needed = f"they give {rank} of 6 directions of a wrench; 'ibvs-qp vehicle FILE' names the others"
             raise out_of_range("vehicle.geometry", self.vehicle.geometry.count, "rotors", needed)
-        arm = round(contact_depth(self.vehicle), 9)
+        arm = round(self.vehicle.contact_depth_m, 9)
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
@@ -111,7 +106,7 @@ class ControllerConfig:
     def from_toml(cls, file: str | Path) -> ControllerConfig:
         """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
         config = load_toml(cls, file)
-        require_margin(config, config.brush, f"{file}: ")
+        contact_margin.require_margin(config, config.brush, f"{file}: ")
         return config
 
     def to_toml(self, *, derived: bool = False) -> str:

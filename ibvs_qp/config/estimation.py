@@ -1,14 +1,37 @@
-"""Settings of the pilot's estimators: motion in the wall plane, tracked lines, tare of the wrench."""
+"""Settings of the estimators: attitude and angular velocity, motion in the wall plane, tracked lines, tare."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import Checked, setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class EstimationConfig:
+class AngularRateSettings(Checked):
+    """Estimates of attitude and angular velocity, and the lead against the motors' lag (docs/how_it_works/model.md)."""
+
+    gyro_bandwidth_hz: float = setting(
+        12.5,
+        "the gyro counts below, the motors' model above; 1000 takes the gyro as it is",
+        unit="Hz",
+        low=0.5,
+        high=1000.0,
+    )
+    attitude_bandwidth_hz: float = setting(
+        8.0,
+        "roll and pitch of the attitude estimate count below, the angular velocity above; 1000 takes them as they are",
+        unit="Hz",
+        low=0.5,
+        high=1000.0,
+    )
+    lead_s: float = setting(
+        0.04, "damping acts on the rate this far ahead: two thirds of the motors' lag", unit="s", low=0.0, high=0.1
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimationConfig(Checked):
     """Noise models and life times; defaults from the sensors of the design, section 5."""
 
     acceleration_noise: float = setting(
@@ -81,7 +104,3 @@ class EstimationConfig:
     contact_spread_m: float = setting(
         0.01, "largest distance of the contact from the tip's centre", unit="m", low=0.0, high=0.5
     )
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
-from ibvs_qp.config.settings import require_order, setting, validate
+from ibvs_qp.config.field_of_view import field_of_view
+from ibvs_qp.config.settings import Checked, require_order, setting
+from ibvs_qp.config.vehicle import VehicleParams
+
+#: Yaw bound per yaw at which a propeller strikes the wall [-], and its range [deg]: at least what `yaw_deg` takes, at
+#: most where the errors of the lines are exact.
+_OF_STRIKE, _LEAST_YAW_DEG, _MOST_YAW_DEG = 0.5, 0.5, 10.0
+#: Least room for a guide between two bounds of the view [-]: of a camera that looks past the wall, which is refused
+#: elsewhere.
+_LEAST_VIEW = 0.02
 
 
 def _slack_weight(default: float, name: str, unit: str, why: str) -> Any:
@@ -30,7 +40,7 @@ def _view_bound(meaning: str, border: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LimitSettings:
+class LimitSettings(Checked):
     """Bounds of the soft limits, weights of their slack per squared unit, and switches.
 
     The program exceeds a bound by the fraction weight / (weight + slack weight) of the demand beyond it, so compare a
@@ -139,6 +149,23 @@ class LimitSettings:
 
     def __post_init__(self) -> None:
         """Validate; the bounds of the view in their order."""
-        validate(self)
+        super().__post_init__()
         require_order(self, "view_up", "view_down", "a level guide has its place between them")
         require_order(self, "view_left", "view_right", "an upright guide has its place between them")
+
+
+def limit_values(vehicle: VehicleParams, view_margin: float) -> dict[str, float]:
+    """Settings of `LimitSettings` that follow from propellers, tip and camera, at a `view_margin`."""
+    yaw = _OF_STRIKE * math.floor(vehicle.strike_yaw_deg)
+    margin = view_margin * vehicle.camera_size_px[0] / vehicle.camera_intrinsics_px[0]
+    view = field_of_view(vehicle)
+    left, right = _within(view.left + margin, view.right - margin)
+    up, down = _within(view.up + margin, view.down - margin)
+    bounds = {"view_left": left, "view_right": right, "view_up": up, "view_down": down}
+    return {"yaw_deg": min(max(yaw, _LEAST_YAW_DEG), _MOST_YAW_DEG)} | bounds
+
+
+def _within(low: float, high: float) -> tuple[float, float]:
+    """The bounds, or a narrow pair in their middle where they cross."""
+    middle = 0.5 * (low + high)
+    return min(low, middle - 0.5 * _LEAST_VIEW), max(high, middle + 0.5 * _LEAST_VIEW)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import Checked, setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class SafetySettings:
+class SafetySettings(Checked):
     """Limits of the monitors and motions of the supervisor."""
 
     supervise: bool = setting(True, "the supervisor acts; without it only the checks of inputs remain")
@@ -117,7 +117,3 @@ class SafetySettings:
     )
     landed_ratio: float = setting(0.3, "weight carried by the ground that counts as landed", low=0.05, high=1.0)
     landed_time_s: float = setting(0.3, "carried for this long", unit="s", low=0.05, high=5.0)
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)

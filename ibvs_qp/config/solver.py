@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.config.settings import Checked, choice, setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolverSettings:
+class SolverSettings(Checked):
     """OSQP and the acceptance test; the values are measured on recorded flights (docs/how_it_works/qp.md)."""
 
     max_iterations: int = setting(500, "deterministic deadline; an iteration takes about 0.5 us", low=1, high=100000)
@@ -37,7 +37,3 @@ class SolverSettings:
     recovery_ticks: int = setting(
         25, "good solutions in a row before the program flies again after none: 0.1 s", low=0, high=10000
     )
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)

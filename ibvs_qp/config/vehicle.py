@@ -8,16 +8,18 @@ import numpy as np
 
 from allocation.geometry import TAROT_T960, RotorGeometry
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.config.settings import require_order, setting, validate
+from ibvs_qp.config.settings import Checked, require_order, setting
 
 #: Rounding of the largest moment of inertia against the sum of the others [-]: equal for a flat body.
 INERTIA_TOLERANCE = 1e-9
 #: Shortest focal length [px].
 SHORTEST_PX = 1.0
+#: Yaw angles at which the clearance of the propellers is computed [deg].
+_YAWS_DEG = np.linspace(0.0, 60.0, 1201)
 
 
 @dataclass(frozen=True, kw_only=True)
-class VehicleParams:
+class VehicleParams(Checked):
     """The tilted hexarotor with its arm, tool, force/torque sensor and camera (positions FRD from the centre of mass).
 
     Nominal values: the Tarot T960 of the paper, with the arm and tool assumed here.
@@ -98,7 +100,7 @@ class VehicleParams:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        validate(self)
+        super().__post_init__()
         require_order(self, "tool_mass_kg", "mass_kg", "the tool is part of the vehicle")
         if min(self.camera_intrinsics_px[:2]) < SHORTEST_PX:
             allowed = f"focal lengths must be at least {SHORTEST_PX:g} px"
@@ -141,3 +143,22 @@ class VehicleParams:
         matrix = self.mass_kg * np.eye(6)
         matrix[3:, 3:] = self.inertia
         return matrix
+
+    @property
+    def contact_depth_m(self) -> float:
+        """Camera to wall in contact, of a level vehicle square to the wall [m]."""
+        return self.tip_position_m[0] - self.camera_position_m[0]
+
+    @property
+    def strike_yaw_deg(self) -> float:
+        r"""Yaw, with the tip on the wall, at which the first propeller strikes it [deg]; 0 if one does at no yaw.
+
+        A disc with hub p, axis t and radius r reaches :math:`n \cdot p + r\sqrt{1 - (n \cdot t)^2}` along the wall's
+        normal n, the tip :math:`n \cdot x`.
+        """
+        yaw = np.radians(np.concatenate((_YAWS_DEG, -_YAWS_DEG)))
+        normals = np.column_stack((np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))))
+        hubs, axes = normals @ self.geometry.positions.T, normals @ self.geometry.axes.T
+        reach = (hubs + self.propeller_radius_m * np.sqrt(np.maximum(1.0 - axes**2, 0.0))).max(axis=1)
+        struck = (reach >= normals @ np.array(self.tip_position_m)).reshape(2, -1).any(axis=0)
+        return float(_YAWS_DEG[int(np.argmax(struck))]) if struck.any() else float(_YAWS_DEG[-1])

@@ -11,7 +11,6 @@ import pytest
 
 from ibvs_qp.config import ContactSettings, ControllerConfig, LimitSettings, VehicleParams
 from ibvs_qp.config.field_of_view import field_of_view
-from ibvs_qp.config.from_vehicle import strike_yaw_deg
 from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.estimation.turned_camera import TurnedCamera, straightened
 
@@ -61,10 +60,10 @@ def test_ends_of_a_turned_picture_lie_on_its_border(turn_deg: tuple[float, float
 
 
 def test_yaw_has_half_of_the_room_to_the_wall() -> None:
-    assert strike_yaw_deg(VehicleParams()) == pytest.approx(19.0, abs=0.5)
+    assert VehicleParams().strike_yaw_deg == pytest.approx(19.0, abs=0.5)
     assert with_vehicle(tip_position_m=(1.2, 0.0, 0.0)).limits.yaw_deg == 10.0
     short = VehicleParams(tip_position_m=(0.65, 0.0, 0.0))
-    struck = math.radians(strike_yaw_deg(short))
+    struck = math.radians(short.strike_yaw_deg)
     normal = np.array((math.cos(struck), math.sin(struck), 0.0))
     hub, axis = short.geometry.positions[4], short.geometry.axes[4]
     reach = normal @ hub + short.propeller_radius_m * math.sqrt(1.0 - (normal @ axis) ** 2)

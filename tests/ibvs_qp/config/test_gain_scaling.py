@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import ibvs_qp
+from ibvs_qp.analysis.contact import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.config import ControllerConfig, Gains, VehicleParams
-from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
-from ibvs_qp.config.derived import Derived
+from ibvs_qp.config.settings import Derived
 from ibvs_qp.pilot import PilotConfig
 
 LIGHT = VehicleParams(mass_kg=3.0, motor_lag_up_s=0.09, motor_lag_down_s=0.14)
