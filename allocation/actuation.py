@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from allocation.contact_reach import PushReach, hover_wrench, push_reach, worst_push_reach
-from allocation.effectiveness import control_effectiveness
-from allocation.geometry import RotorGeometry
-from allocation.hover_tilt import least_hover_tilt
-from allocation.least_squares import allocate_least_squares
-from allocation.level_flight import worst_level_reach
+from allocation.allocators import allocate_least_squares
+from allocation.geometry import RotorGeometry, control_effectiveness
+from allocation.hover import hover_wrench, least_hover_tilt, worst_level_reach
+from allocation.reach import PushReach, push_reach, worst_push_reach
 from allocation.wrench_facets import WrenchFacets
 
-#: A singular value below this share of the largest counts as zero [-]: such a wrench needs 1,000 times the thrust.
+#: A singular value below this fraction of the largest counts as zero [-]: such a wrench needs 1,000 times the thrust.
 LEAST_SINGULAR = 1e-3
 #: Least mean lever that moments are divided by [m].
 LEAST_LEVER = 1e-3

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from allocation.least_squares import allocate_least_squares
-from allocation.sequential_desaturation import allocate_sequential
+from allocation import allocate_least_squares, allocate_sequential
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.config.settings import setting, validate
+from ibvs_qp.config.settings import Checked, setting
 
 #: Smallest share of the quadratic part that is inverted as such [-]; below it the curve is a straight line.
 LEAST_FACTOR = 1e-6
@@ -22,22 +22,14 @@ LEAST_VOLTAGE, LARGEST_VOLTAGE = 0.6, 1.1
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThrustCurve:
+class ThrustCurve(Checked):
     """Curve of a rotor with its motor, speed controller and battery."""
 
-    thrust_max_n: float = setting(
-        52.56, "thrust at full command and full voltage", unit="N", why="Tarot T960", low=0.1, high=1000.0
-    )
+    thrust_max_n: float = setting(52.56, "thrust at full command and full voltage", "N", 0.1, 1000.0, why="Tarot T960")
     quadratic: float = setting(
         1.0, "share f of the quadratic part, PX4's THR_MDL_FAC; 0 for a linear speed controller", low=0.0, high=1.0
     )
-    full_voltage_v: float = setting(
-        25.2, "voltage at which the thrust was measured", unit="V", why="6 cells", low=1.0, high=1000.0
-    )
-
-    def __post_init__(self) -> None:
-        """Refuse values out of range."""
-        validate(self)
+    full_voltage_v: float = setting(25.2, "voltage at which the thrust was measured", "V", 1.0, 1000.0, why="6 cells")
 
     def limit(self, voltage: float | None = None) -> float:
         """Thrust at full command [N]: the upper limit to report to the controller as the battery sags.

@@ -41,28 +41,21 @@ class ControllerConfig(Checked):
     solver: SolverSettings = field(default_factory=SolverSettings)
     brush: BrushSettings = field(default_factory=BrushSettings)
     gains_of: str = choice(
-        "qp", "law whose tuned gains, scaled to the vehicle, are those that are not stated; a pilot's own law", LAWS
+        "qp", "law whose tuned gains, scaled to the vehicle, are the defaults; a pilot sets its own", LAWS
     )
     line_profile: str = choice(
-        "tip",
-        "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
-        ("tip", "paper"),
+        "tip", "point of the line error: where the tip meets the wall, or the paper's image centre", ("tip", "paper")
     )
     analytic_line_point: str = choice(
         "tip",
-        "error of the analytic law's line rows: at the point where the tip meets the wall, or rho at the image centre, "
-        "as printed",
+        "the same of the analytic law: where the tip meets the wall, or rho at the image centre, as printed",
         ("tip", "centre"),
     )
     analytic_angle_row: bool = setting(
-        False,
-        "angle row of the analytic law, as printed; False: level flight alone fixes roll, its peak falls to a third "
-        "(theta_kp = 0 still takes roll from it)",
+        False, "angle row of the analytic law, as printed; without it the level rows fix roll, with a third of its peak"
     )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
-    tick_s: float = setting(
-        0.004, "control period; a longer tick than 0.02 s is taken for a pause", unit="s", low=0.0005, high=LONGEST_TICK
-    )
+    tick_s: float = setting(0.004, "control period; beyond 0.02 s it is a pause", "s", 0.0005, LONGEST_TICK)
     impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
     contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
     touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
@@ -73,8 +66,7 @@ class ControllerConfig(Checked):
     )
     allocator: str = choice(
         "clip",
-        "allocation of the analytic law where a rotor reaches a limit: the paper's clipping, sequential desaturation "
-        "(lateral force yields first), or weighted least squares within the limits",
+        "allocator of the analytic law: the paper's clipping, sequential desaturation, or bounded least squares",
         ("clip", "sequential", "box"),
     )
 

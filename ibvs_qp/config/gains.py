@@ -31,7 +31,7 @@ LONGEST_FILTER = 0.1
 
 def _gain(default: float, doc: str, *, unit: str = "", high: float) -> Any:
     """Setting of a gain; one that is not stated is that of the law, scaled to the vehicle (`scaled_gains`)."""
-    return setting(Derived(default), doc, unit=unit, low=0.0, high=high)
+    return setting(Derived(default), doc, unit, 0.0, high)
 
 
 def _lead(of: str, default: float) -> Any:
@@ -58,9 +58,7 @@ class Gains(Checked):
     line_filter_s: float = _filter("line rows", 0.0078)
     theta_kp: float = _gain(33.34, "line angle error", unit="1/s^2", high=400.0)
     theta_kd: float = _gain(9.223, "line angle rate", unit="1/s", high=100.0)
-    body_rotation_gain: float = _gain(
-        0.4796, "fraction of the body's rotation in line rows while the tip travels", high=1.0
-    )
+    body_rotation_gain: float = _gain(0.4796, "fraction of body rotation in line rows during travel", high=1.0)
     velocity_kp: float = _gain(5.0, "velocity error along free directions", unit="1/s", high=50.0)
     velocity_ki: float = _gain(2.804, "integral of that error", unit="1/s^2", high=50.0)
     velocity_lead_s: float = _lead("velocity error", 0.055)
@@ -114,7 +112,7 @@ def scaled_gains(vehicle: VehicleParams, law: str = "qp") -> dict[str, float]:
 
 def _weight(default: float, rows: str, unit: str, why: str) -> Any:
     """Setting of a weight per squared unit of its rows, so that the cost has no unit."""
-    return setting(default, rows, unit=unit, why=why, low=0.0, high=1e6)
+    return setting(default, rows, unit, 0.0, 1e6, why=why)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,38 +121,24 @@ class Weights(Checked):
 
     line: float = _weight(100.0, "line rows", "s^4", "0.1 image units/s^2: 5 cm/s^2 half a metre from the wall")
     line_angle: float = _weight(
-        0.05, "angle rows of the lines", "s^4/rad^2", "four orders below level flight: a sloped edge must not tilt"
+        0.05, "angle rows of the lines", "s^4/rad^2", "four orders below level: a sloped edge must not tilt"
     )
     push: float = _weight(
-        0.5,
-        "push row, and with 1 - lambda the stand-off row",
-        "1/N^2",
-        "1.4 N: far below all others, so an unreachable push yields first",
+        0.5, "push row; with 1 - lambda the stand-off row", "1/N^2", "1.4 N: an unreachable push yields first"
     )
     level: float = _weight(
-        400.0, "roll and pitch rows", "s^4/rad^2", "0.05 rad/s^2: 3.5 cm/s^2 at the tip, less than the lines accept"
+        400.0, "roll and pitch rows", "s^4/rad^2", "0.05 rad/s^2: 3.5 cm/s^2 at the tip, below the lines"
     )
-    yaw: float = _weight(
-        400.0, "yaw row", "s^4/rad^2", "as roll and pitch; with 60 a vehicle whose rotors weaken hits the ground"
-    )
+    yaw: float = _weight(400.0, "yaw row", "s^4/rad^2", "as roll and pitch; with 60 weak rotors end on the ground")
     velocity: float = _weight(
-        100.0, "free velocity rows", "s^4/m^2", "0.1 m/s^2, as the lines: yields before height and level flight"
+        100.0, "free velocity rows", "s^4/m^2", "0.1 m/s^2, as the lines: yields before height and level"
     )
-    height: float = _weight(
-        1.6e3, "height row", "s^4/m^2", "0.025 m/s^2 = 0.15 N: an unreachable push must not lift the vehicle"
-    )
+    height: float = _weight(1.6e3, "height row", "s^4/m^2", "0.025 m/s^2 = 0.15 N: an unreachable push must not lift")
     margin: float = _weight(
         0.01, "redundant thrusts, of more than six rotors", "1/N^2", "10 N: above effort, below every task"
     )
     effort: float = setting(
-        1e-3,
-        "thrust away from the last one",
-        unit="1/N^2",
-        why="30 N: costs the push 0.004 N rms together with smoothness",
-        low=1e-9,
-        high=1e3,
+        1e-3, "thrust away from the last one", "1/N^2", 1e-9, 1e3, why="30 N: with smoothness 0.004 N rms of push"
     )
-    smoothness: float = setting(
-        1e-3, "change of the thrust step", unit="1/N^2", why="30 N, as the effort row", low=0.0, high=1e3
-    )
+    smoothness: float = setting(1e-3, "change of the thrust step", "1/N^2", 0.0, 1e3, why="30 N, as the effort row")
     line_sigma: float = setting(2e-2, "line deviation at which a row's weight halves", low=1e-6, high=1.0)

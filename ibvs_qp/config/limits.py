@@ -20,12 +20,12 @@ _LEAST_VIEW = 0.02
 
 def _slack_weight(default: float, name: str, unit: str, why: str) -> Any:
     """Setting of a slack weight per squared unit of its rows."""
-    return setting(default, f"slack weight of {name}", unit=unit, why=why, low=1e-3, high=1e8)
+    return setting(default, f"slack weight of {name}", unit, 1e-3, 1e8, why=why)
 
 
 def _poles(default: float, name: str, why: str) -> Any:
     """Setting of the pole of a barrier: how fast its bound may be approached."""
-    return setting(default, f"poles of {name}", unit="1/s", why=why, low=0.1, high=100.0)
+    return setting(default, f"poles of {name}", "1/s", 0.1, 100.0, why=why)
 
 
 def _view_bound(meaning: str, border: str) -> Any:
@@ -48,24 +48,19 @@ class LimitSettings(Checked):
     """
 
     tilt_deg: float = setting(
-        1.0,
-        "zero-tilt bound on roll and pitch",
-        unit="deg",
-        why="a job allows 2 deg; painting in calm air takes 0.12 deg rms",
-        low=0.05,
-        high=45.0,
+        1.0, "bound on roll and pitch", "deg", 0.05, 45.0, why="a job allows 2 deg; calm air takes 0.12 deg rms"
     )
     trim_deg: float = setting(
         0.0,
         "roll and pitch that a push above 85 % of the level reach may take",
         unit="deg",
-        why="a permission of the mission: 2 deg add 1.0 N standing and 2.0 N sliding sideways at a friction of 0.8",
+        why="a permission of the mission: 2 deg add 1.0 N at rest and 2.0 N sliding sideways at a friction of 0.8",
         low=0.0,
         high=10.0,
     )
     thrust_noise_n: float = setting(
         0.5,
-        "excess of a thrust over its limits in contact that is noise and clipped; of a larger one, up to 5 times, less",
+        "excess of a thrust over its limits in contact that is clipped as noise; fades out at 5 times this",
         unit="N",
         why="twice the noise of a thrust in calm air; at the reach 1 N of a rear thrust is 3 N of push",
         low=0.0,
@@ -73,26 +68,24 @@ class LimitSettings(Checked):
     )
     tilt_slack_weight: float = _slack_weight(4000.0, "the tilt barriers", "s^4/rad^2", "ten times the level rows")
     tilt_rate_1_s: float = _poles(
-        12.0,
-        "the tilt barriers",
-        "below the level loop's 17 1/s, whose braking they must not limit; there they brake late",
+        12.0, "the tilt barriers", "below the level loop's 17 1/s, whose braking they must not limit"
     )
     yaw_deg: float = setting(
         None,
-        "yaw bound; from propellers and tip if not stated",
+        "yaw bound; default from propellers and tip",
         unit="deg",
-        why="half of the yaw at which a propeller strikes the wall, 19 deg on the Tarot T960, and at most 10 deg",
+        why="half of the yaw at which a propeller strikes (Tarot T960: 19 deg), at most 10 deg",
         low=0.5,
         high=45.0,
     )
     yaw_slack_weight: float = _slack_weight(
-        1000.0, "the yaw barrier", "s^4/rad^2", "above every row that turns the vehicle; not sensitive"
+        1000.0, "the yaw barrier", "s^4/rad^2", "above every row that turns the vehicle"
     )
     yaw_rate_1_s: float = _poles(5.0, "the yaw barrier", "a third of the motors' 17 1/s; 20 1/s brake too late")
     view_margin: float = setting(
         0.033,
-        "farthest place of a guide inside the picture's border, as a share of the picture's width",
-        why="perception looks 14 of 640 px to each side of a line, and the soft barrier yields by half as much",
+        "least distance of a guide from the image border over the image width",
+        why="perception needs 14 of 640 px on each side of a line, and the soft barrier yields by half as much",
         low=0.0,
         high=0.4,
     )
@@ -101,50 +94,35 @@ class LimitSettings(Checked):
     view_left: float = _view_bound("least rho of an upright guide, its normal to the right", "left")
     view_right: float = _view_bound("largest rho of an upright guide, its normal to the right", "right")
     view_slack_weight: float = _slack_weight(
-        4e4, "the line-in-view barriers", "s^4", "400 times the line rows; at a thirtieth a guide leaves the picture"
+        4e4, "the line-in-view barriers", "s^4", "400 times the line rows; a thirtieth loses guides"
     )
     view_rate_1_s: float = _poles(
-        10.0, "the line-in-view barriers", "those of the line loop: slower ones hold back its corrections"
+        10.0, "the line-in-view barriers", "as the line loop: slower ones limit its corrections"
     )
     push_ceiling_ratio: float = setting(
-        1.5,
-        "push ceiling over the push reference",
-        why="2.5 N above 5 N is three times the error that gusts of 2 N rms leave",
-        low=1.0,
-        high=100.0,
+        1.5, "push ceiling over the reference", why="three times the error in gusts of 2 N rms", low=1.0, high=100.0
     )
     push_quiet_m_s: float = setting(
-        0.005,
-        "closing speed that the push ceiling ignores as noise",
-        unit="m/s",
-        why="otherwise 2.4 N at 10 kN/m: the ceiling would be active in 13 % of a press",
-        low=0.0,
-        high=1.0,
+        0.005, "closing speed that the push ceiling ignores", "m/s", 0.0, 1.0, why="noise: 2.4 N at 10 kN/m"
     )
     push_slack_weight: float = _slack_weight(40.0, "the push ceiling", "1/N^2", "80 times the push row")
     approach_speed_ratio: float = setting(
-        1.5,
-        "closing speed over that of the approach",
-        why="the barrier is active in 5 % of an approach, with 1.0 in 82 %",
-        low=1.0,
-        high=100.0,
+        1.5, "largest closing over approach speed", why="active in 5 % of an approach; 1.0: 82 %", low=1.0, high=100.0
     )
     approach_rate_1_s: float = _poles(
-        10.0, "the approach-speed barrier", "stops a vehicle at 0.3 m/s within 0.12 m; with 5 the tip strikes"
+        10.0, "the approach-speed barrier", "stops 0.3 m/s within 0.12 m; with 5 the tip strikes"
     )
     approach_slack_weight: float = _slack_weight(
-        4000.0, "the approach-speed barrier", "s^4/m^2", "220 times the stand-off row, 0.5 per N^2 at 6 kg"
+        4000.0, "the approach-speed barrier", "s^4/m^2", "220 times the stand-off row"
     )
     tilt_barrier: bool = setting(True, "zero-tilt barriers on roll and pitch")
     yaw_barrier: bool = setting(True, "yaw barrier")
     view_barrier: bool = setting(True, "line-in-view barriers")
-    view_rotation: bool = setting(
-        False, "line-in-view barriers turn the vehicle too, not only move it: a pitched vehicle moves its tip"
-    )
+    view_rotation: bool = setting(False, "line-in-view barriers turn the vehicle too, which moves the tip")
     push_barrier: bool = setting(True, "push-force ceiling")
     approach_barrier: bool = setting(True, "approach-speed barrier")
     hard_barriers: bool = setting(
-        False, "no slack on any barrier: the program may have no solution, and the conflicting rows are named then"
+        False, "no slack on any barrier; the conflicting rows of an infeasible program are named"
     )
 
     def __post_init__(self) -> None:

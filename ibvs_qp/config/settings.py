@@ -29,11 +29,11 @@ class Derived(float):
 def setting(
     default: Any,
     doc: str,
-    *,
     unit: str = "",
-    why: str = "",
     low: float = -math.inf,
     high: float = math.inf,
+    *,
+    why: str = "",
     words: tuple[str, ...] = (),
 ) -> Any:
     """Declare a settings field with its unit and closed allowed range [low, high].
@@ -42,9 +42,9 @@ def setting(
         default: Number, boolean, string, or tuple of numbers; None for a value that follows from others.
         doc: Meaning, and source of the value unless ``why`` gives it.
         unit: SI unit, empty for a pure number.
-        why: Reason for the default.
         low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
+        why: Reason for the default.
         words: Strings that are allowed beside numbers.
     """
     limits = {"low": low, "high": high, "words": words}

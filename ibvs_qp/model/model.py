@@ -10,7 +10,7 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact import LEAST_PUSH_DENSITY
 from ibvs_qp.config.errors import ConfigError

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from allocation import WrenchFacets, tilted_push_reach, worst_tilted_push_reach
 from allocation.actuation import SLIDING_FRICTION, Actuation, actuation
-from allocation.tilted_reach import tilted_push_reach, worst_tilted_push_reach
-from allocation.wrench_facets import WrenchFacets
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.pilot.config import PilotConfig

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.analysis.motion import TICKS_LATE
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY, down_in_body, roll_pitch

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibvs_qp.adapters.px4_rotors import DEFAULTS, read_px4
+from ibvs_qp.adapters.px4 import DEFAULTS, read_px4
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import LARGEST_TOML, parse_toml, read_bytes
 from ibvs_qp.config.settings import from_dict

@@ -9,7 +9,7 @@ import pytest
 
 from allocation import TAROT_T960, RotorGeometry, control_effectiveness
 from ibvs_qp import preset
-from ibvs_qp.adapters.px4_rotors import from_px4, to_px4
+from ibvs_qp.adapters.px4 import from_px4, to_px4
 from ibvs_qp.config.errors import ConfigError
 
 OCTOROTOR = preset("octorotor_qp").controller.vehicle

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from allocation import TAROT_T960, RotorGeometry, control_effectiveness
-from ibvs_qp.adapters.px4_setpoints import setpoint_scale
+from ibvs_qp.adapters.px4 import setpoint_scale
 from ibvs_qp.presets import preset
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, attitude, measured
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.analysis.motion import TICKS_LATE, MotionLoop
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.safety.hover import hold_thrusts, hover_gains
