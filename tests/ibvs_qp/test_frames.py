@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -44,6 +44,7 @@ def test_camera_axes_are_right_down_front_of_the_body() -> None:
     np.testing.assert_allclose(to_camera(np.array([0.7, 0.01, 0.0]), np.array([0.2, 0.0, 0.08])), [0.01, -0.08, 0.5])
 
 
+@settings(deadline=None)
 @given(any_angle, angles, angles)
 def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float, roll: float) -> None:
     q = quaternion(yaw, pitch, roll)
@@ -54,6 +55,7 @@ def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float
     np.testing.assert_allclose(rotation_from_quaternion(-q), expected, atol=1e-12)  # q and -q are one attitude
 
 
+@settings(deadline=None)
 @given(any_angle, angles, angles)
 def test_rotation_of_one_vector_is_that_of_the_matrix(yaw: float, pitch: float, roll: float) -> None:
     q, vector = quaternion(yaw, pitch, roll), (0.3, -2.0, 1.1)
@@ -80,6 +82,7 @@ def test_signs_of_roll_pitch_and_yaw_are_ned() -> None:
     assert (rotation_from_quaternion(quaternion(0.1, 0, 0)) @ [1, 0, 0])[1] > 0  # nose to the east
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
 def test_cross_and_skew_agree_with_numpy(numbers: list[float]) -> None:
     a, b = np.array(numbers[:3]), np.array(numbers[3:])
@@ -102,6 +105,7 @@ def test_camera_twist_is_the_motion_of_the_camera() -> None:
         np.testing.assert_allclose(camera_twist_matrix(camera) @ twist, [*linear, *angular], atol=1e-8)
 
 
+@settings(deadline=None)
 @given(st.floats(-1.0, 1.0), any_angle, any_angle)
 def test_aligned_line_is_the_same_line_and_agrees_with_the_reference(rho: float, theta: float, seam: float) -> None:
     for sign in (0, 1):

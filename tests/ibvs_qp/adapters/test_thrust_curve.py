@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ibvs_qp.adapters.thrust_curve import ThrustCurve
 from ibvs_qp.config.errors import ConfigError
 
 
+@settings(deadline=None)
 @given(
     quadratic=st.floats(0.0, 1.0),
     voltage=st.one_of(st.none(), st.floats(15.0, 30.0)),
