@@ -1,4 +1,4 @@
-"""What the rotors of a vehicle can do: actuated directions, hover, reach in level flight, and loss of a rotor."""
+"""Capabilities of the rotors of a vehicle: actuated directions, hover, reach in level flight, and loss of a rotor."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DIRECTIONS = ("force front", "force right", "force down", "moment roll", "moment
 
 @dataclass(frozen=True, kw_only=True)
 class Actuation:
-    """What the rotors can do.
+    """Capabilities of rotors within their thrust limits.
 
     Attributes:
         effectiveness: B, (6, n).
@@ -117,7 +117,5 @@ def _in_words(direction: np.ndarray) -> str:
     """Components of a wrench direction, the largest first; those below a tenth of it are left out."""
     order = sorted(range(6), key=lambda index: -abs(direction[index]))
     largest = direction[order[0]]
-    shares = [(DIRECTIONS[index], direction[index] / largest) for index in order]
-    return " ".join(
-        name if place == 0 else f"{share:+.1f} {name}" for place, (name, share) in enumerate(shares) if abs(share) > 0.1
-    )
+    others = [(DIRECTIONS[index], direction[index] / largest) for index in order[1:]]
+    return " ".join((DIRECTIONS[order[0]], *(f"{part:+.1f} {name}" for name, part in others if abs(part) > 0.1)))

@@ -61,7 +61,7 @@ def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple
     """L and the commanded image acceleration: every line, and with `analytic_angle_row` the angle of the central one.
 
     Stacking the angle rows of a horizontal and a vertical line as printed makes their difference command pitch through
-    a lever of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.
+    a lever of rho: measured, a vertical edge entering the image pitched the vehicle by 14 degrees.
     """
     at_tip = config.analytic_line_point == "tip"
     rows = [endpoint_line_row(line.matrix, line.theta, line.tip) if at_tip else line.matrix[0] for line in lines]
@@ -74,7 +74,7 @@ def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple
 
 
 def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:
-    """`numpy.linalg.pinv` of a small matrix to the bit, without its handling of stacks: half the time."""
+    """Bit-identical to `numpy.linalg.pinv` of a small matrix, without its handling of stacks: half the time."""
     left, singular, right = np.linalg.svd(matrix, full_matrices=False)
     values = singular.tolist()  # the largest first
     least = RANK_TOLERANCE * values[0]

@@ -10,7 +10,7 @@ counter-clockwise rotor: C_T times the column of `allocation.control_effectivene
 
 Its pseudo-inverse (`ControlAllocationPseudoInverse`) divides every column of the mixer
 :math:`M = (B\,\mathrm{diag}(C_T))^+` by a scale s of its own, so the setpoint of a wrench w is :math:`s \odot w`:
-PX4 then commands :math:`M w`, up to what it rounds to zero and what it limits.
+PX4 then commands :math:`M w`, except for entries that it rounds to zero or limits.
 """
 
 from __future__ import annotations
@@ -69,13 +69,13 @@ def read_px4(file: str | Path) -> Px4Rotors:
 
 
 def from_px4(text: str) -> Px4Rotors:
-    """Rotors of a text with CA_ROTOR_COUNT and CA_ROTORn_*; what is missing has PX4's default.
+    """Rotors of a text with CA_ROTOR_COUNT and CA_ROTORn_*; missing values have PX4's defaults.
 
     Args:
         text: Parameters as QGroundControl or ``param save`` write them, or the ``param set`` of a script.
 
     Raises:
-        ConfigError: When a value is no number, or no geometry results.
+        ConfigError: When a value is not a number, or the rotors are no geometry.
     """
     count, values = 0, dict[int, dict[str, float]]()
     for rotor, name, total, number in _LINE.findall(text):

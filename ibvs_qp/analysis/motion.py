@@ -14,7 +14,7 @@ row, :math:`F(s) = (1 - k_u) / (1 - k_u e^{-s \Delta t})` with :math:`k_u = e^{-
                      {1 + F(s) K_d (T + 1/(s + \omega_g)) / (\tau s + 1)}, \qquad
     M_s = \max_\omega |1 + L(j\omega)|^{-1}.
 
-The loop bears any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
+The loop tolerates any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
 from a sample to the middle of the hold of its command.
 
 The formula is finite for an unstable loop, too. The same loop in discrete time, with a command that acts one tick after
@@ -30,8 +30,8 @@ import numpy as np
 
 from ibvs_qp.config.controller import ControllerConfig
 
-#: Gains with a larger sensitivity peak are not searched: 2.0 bears twice the gain and 29 degrees of phase. The same
-#: with motors of another lag than the configured one, and the ratios of that lag: 2.3 bears 1.8 times the gain.
+#: Gains with a larger sensitivity peak are not searched: 2.0 tolerates twice the gain and 29 degrees of phase. The same
+#: with motors of another lag than the configured one, and the ratios of that lag: 2.3 tolerates 1.8 times the gain.
 LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, LAG_RATIOS = 2.0, 2.3, (0.75, 1.3)
 #: Ticks from a sample to the middle of its command's hold: half a tick, and a tick that a sample may be old.
 TICKS_LATE = 1.5
@@ -113,7 +113,7 @@ class MotionLoop:
 
 
 def motion_sensitivity(config: ControllerConfig, lag_ratio: float = 1.0) -> dict[str, float]:
-    """Sensitivity peaks of "attitude", "yaw", "line", "standoff" and "landing"; see `ibvs_qp.analysis.motion`.
+    """Sensitivity peaks of "attitude", "yaw", "line", "standoff" and "landing"; see `MotionLoop`.
 
     The rates of lines and distance come from the accelerometer and the camera; their leads from the motors' model. The
     last centimetre of an approach, "landing", has a damping of its own. Its speed follows the distance here; at the

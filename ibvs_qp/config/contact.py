@@ -10,7 +10,7 @@ from ibvs_qp.config.settings import Checked, require_order, setting
 from ibvs_qp.config.vehicle import VehicleParams
 
 #: Camera to wall beyond that in contact [m]: the push is full up to the first and none from the second. The depth of a
-#: picture is good to millimetres, and the stand-off before a touch is 6 cm.
+#: image is good to millimetres, and the stand-off before a touch is 6 cm.
 _FULL_PUSH_M, _NO_PUSH_M = 0.03, 0.13
 #: Process noise of the filter of push and disturbance: of the rotors, 1 % with 50 ms, is 0.1 N along the normal; of the
 #: push, by an uncertain stiffness [N/sqrt(s)].

@@ -30,7 +30,7 @@ LONGEST_TICK = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerConfig(Checked):
-    """Configuration of a controller; the default flies the Tarot T960."""
+    """Configuration of a controller; the default is the Tarot T960."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
     gains: Gains = field(default_factory=Gains)
@@ -86,7 +86,7 @@ class ControllerConfig(Checked):
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
 
     def on_backend(self, backend: str) -> ControllerConfig:
-        """The same with another solver backend."""
+        """The same configuration with another solver backend."""
         return dataclasses.replace(self, solver=dataclasses.replace(self.solver, backend=backend))
 
     @property
@@ -102,5 +102,5 @@ class ControllerConfig(Checked):
         return config
 
     def to_toml(self, *, derived: bool = False) -> str:
-        """Write the configuration as TOML text; with ``derived`` also what follows from the rest, for a record."""
+        """Write the configuration as TOML text; with ``derived`` also the derived values, for a record."""
         return dump_toml(self, derived=derived)

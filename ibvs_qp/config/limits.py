@@ -30,13 +30,8 @@ def _poles(default: float, name: str, why: str) -> Any:
 
 def _view_bound(meaning: str, border: str) -> Any:
     """Setting of one bound of the view barriers; from the camera if not stated."""
-    return setting(
-        None,
-        meaning,
-        why=f"the picture's {border} border and view_margin; from the camera if not stated",
-        low=-10,
-        high=10,
-    )
+    why = f"the image's {border} border and view_margin; default from the camera"
+    return setting(None, meaning, low=-10, high=10, why=why)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +39,7 @@ class LimitSettings(Checked):
     """Bounds of the soft limits, weights of their slack per squared unit, and switches.
 
     The program exceeds a bound by the fraction weight / (weight + slack weight) of the demand beyond it, so compare a
-    slack weight with the weights of the rows that pull against it. `tests/ibvs_qp/limits/test_barriers.py` flies them.
+    slack weight with the weights of the rows that pull against it (`tests/ibvs_qp/limits/test_barriers.py`).
     """
 
     tilt_deg: float = setting(

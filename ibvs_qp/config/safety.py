@@ -24,14 +24,14 @@ class SafetySettings(Checked):
     )
     moment_offset_n_m: float = setting(0.07, "moment: 1.5 times the largest of 60 harsh flights", "N m", 0.001, 2.0)
 
-    image_age_s: float = setting(0.2, "oldest picture: latency, and two dropped ones", "s", 0.05, 5.0)
-    first_picture_s: float = setting(3.0, "latest first picture and wall plane", "s", 0.1, 600.0)
+    image_age_s: float = setting(0.2, "oldest image: latency and two dropped ones", "s", 0.05, 5.0)
+    first_picture_s: float = setting(3.0, "latest first image and wall plane", "s", 0.1, 600.0)
     plane_age_s: float = setting(0.3, "oldest wall plane", "s", 0.05, 5.0)
-    lines_age_s: float = setting(0.5, "oldest picture with a line", "s", 0.1, 10.0)
+    lines_age_s: float = setting(0.5, "oldest image with a line", "s", 0.1, 10.0)
     wrench_age_s: float = setting(0.03, "oldest force sample: three periods at 100 Hz", "s", 0.005, 1.0)
     imu_age_s: float = setting(0.02, "oldest attitude, gyro or accelerometer: five ticks", "s", 0.002, 0.5)
     frozen_samples: int = setting(10, "equal force samples in a row, of a sensor with noise: 0.1 s", low=3, high=1000)
-    frozen_pictures: int = setting(4, "the same of pictures: 0.13 s", low=2, high=1000)
+    frozen_pictures: int = setting(4, "the same of images: 0.13 s", low=2, high=1000)
     frozen_imu_samples: int = setting(6, "the same of inertial samples: 24 ms", low=3, high=1000)
     refusal_s: float = setting(0.25, "longest refusal of camera velocities by the filter", "s", 0.05, 10.0)
 

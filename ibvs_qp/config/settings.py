@@ -7,7 +7,6 @@ and `choice`. The same metadata validates a value, explains its error, and docum
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import math
 import numbers
@@ -153,6 +152,8 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
     for key, value in table.items():
         place = f"{path}.{key}" if path else key
         if key not in known:
+            import difflib
+
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(known)}"
             raise ConfigError(f"unknown key {shown(place)}{hint}")

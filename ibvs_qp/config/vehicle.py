@@ -54,7 +54,7 @@ class VehicleParams(Checked):
     arm_radius_m: float = setting(0.015, "radius of the arm", "m", 0.001, 0.2)
     camera_position_m: Vector = setting((0.20, 0.0, 0.08), "camera centre", "m", -3.0, 3.0)
     camera_turn_deg: Vector = setting((0.0, 0.0, 0.0), "its turn from +x, rotation vector in B", "deg", -180.0, 180.0)
-    camera_size_px: tuple[int, int] = setting((640, 480), "width and height of the picture", "px", 32, 8192)
+    camera_size_px: tuple[int, int] = setting((640, 480), "width and height of the image", "px", 32, 8192)
     camera_intrinsics_px: tuple[float, float, float, float] = setting(
         (625.22, 625.22, 319.5, 239.5), "fx, fy, cx, cy; pixel centres at integers", "px", -1e5, 1e5
     )

@@ -1,4 +1,4 @@
-"""The controller as a module to drop in: what loading it pulls in, and what it does without."""
+"""The controller as a module to drop in: packages that it loads, and a light installation."""
 
 from __future__ import annotations
 
