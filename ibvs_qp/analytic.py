@@ -87,28 +87,25 @@ def analytic_thrusts(setpoints: Setpoints) -> np.ndarray:
     return setpoints.inverse.dot(analytic_wrench(setpoints) - setpoints.bias_wrench)
 
 
-def allocate(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
-    """Thrusts within this tick's window by the configured allocator [N], (n,).
+def allocate(setpoints: Setpoints, free: np.ndarray, allocator: str = "") -> np.ndarray:
+    """Thrusts within this tick's window [N], (n,).
 
     Args:
         setpoints: Set-points of the tick, with the window.
         free: Thrusts of the desired wrench without limits [N], (n,), finite.
+        allocator: "clip", "sequential" or "box"; the configured one if empty.
     """
-    lower, upper, clipped = setpoints.lower, setpoints.upper, clip(setpoints, free)
-    if setpoints.config.allocator == "clip" or np.array_equal(clipped, free):
+    allocator, clipped = allocator or setpoints.config.allocator, clip(setpoints, free)
+    if allocator == "clip" or np.array_equal(clipped, free):
         return clipped
     matrix = setpoints.effectiveness
-    function = allocate_sequential if setpoints.config.allocator == "sequential" else allocate_least_squares
-    return function(matrix.dot(free), matrix, lower, upper)
+    function = allocate_sequential if allocator == "sequential" else allocate_least_squares
+    return function(matrix.dot(free), matrix, setpoints.lower, setpoints.upper)
 
 
 def allocate_in_box(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
     """Thrusts within this tick's window whose wrench is nearest [N], (n,): the allocator of the program's fallback."""
-    clipped = clip(setpoints, free)
-    if np.array_equal(clipped, free):
-        return clipped
-    matrix = setpoints.effectiveness
-    return allocate_least_squares(matrix.dot(free), matrix, setpoints.lower, setpoints.upper)
+    return allocate(setpoints, free, "box")
 
 
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:
