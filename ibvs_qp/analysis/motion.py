@@ -134,18 +134,8 @@ def motion_sensitivity(config: ControllerConfig, lag_ratio: float = 1.0) -> dict
         "standoff": (approach * gains.standoff_kp, approach, 0.0, *along, no_motor_model),
         "landing": (landing * gains.standoff_kp, landing, 0.0, *along, no_motor_model),
     }
+    tick, names = config.tick_s, ("kp", "kd", "ki", "lead", "filter_s", "bandwidth_hz")
+    shared = {"lag": vehicle.motor_lag_s, "delay": TICKS_LATE * tick, "tick_s": tick, "lag_ratio": lag_ratio}
     return {
-        name: MotionLoop(
-            kp=kp,
-            kd=kd,
-            ki=ki,
-            lag=vehicle.motor_lag_s,
-            delay=TICKS_LATE * config.tick_s,
-            lead=lead,
-            filter_s=filter_s,
-            tick_s=config.tick_s,
-            lag_ratio=lag_ratio,
-            bandwidth_hz=bandwidth,
-        ).sensitivity_peak
-        for name, (kp, kd, ki, lead, filter_s, bandwidth) in loops.items()
+        loop: MotionLoop(**shared, **dict(zip(names, own, strict=True))).sensitivity_peak for loop, own in loops.items()
     }
