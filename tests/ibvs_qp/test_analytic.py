@@ -99,10 +99,7 @@ def test_full_contact_keeps_the_force_command() -> None:
 def test_one_angle_row_only() -> None:
     """Two lines that disagree about the roll by a degree do not pitch the vehicle; stacked as printed they would."""
     wall = Wall(attitude(), 0.0)
-    seen = (
-        wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
-        wall.line(-0.12, -0.02, VERTICAL),
-    )
+    seen = (wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL), wall.line(-0.12, -0.02, VERTICAL))
     setpoints = analytic_setpoints(PRINTED)
     setpoints.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
     assert len(setpoints.lines) == 2
