@@ -51,7 +51,7 @@ def push_reach(
         sliding_friction: Coulomb coefficient of a tip that slides to the left; 0 for a tip at rest.
     """
     vehicle = VehicleParams()
-    return allocation.reach(
+    return allocation.push_reach(
         vehicle.geometry,
         mass_kg * GRAVITY,
         np.array(vehicle.tip_position_m),
