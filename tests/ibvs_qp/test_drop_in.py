@@ -103,7 +103,10 @@ def test_a_command_line_check_loads_no_solver() -> None:
     assert not modules & {"casadi", "osqp", "scipy", "cv2"}
 
 
-@pytest.mark.parametrize("package", ["ibvs_qp", "ibvs_qp.pilot", "ibvs_qp.vision", "ibvs_qp.vision.paper"])
+PAGES = ["ibvs_qp", "ibvs_qp.config.contact_margin", "ibvs_qp.pilot", "ibvs_qp.vision", "ibvs_qp.vision.paper"]
+
+
+@pytest.mark.parametrize("package", PAGES)
 def test_every_lazy_name_is_the_thing_itself(package: str) -> None:
     """A module of the same name as a function would hide it from the second import on."""
     module = importlib.import_module(package)

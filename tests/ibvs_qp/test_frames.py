@@ -27,6 +27,7 @@ from ibvs_qp.frames import (
     skew,
     to_camera,
 )
+from ibvs_qp.quaternion import angle_between, multiply, small_difference, small_turn, turned
 
 angles = st.floats(-1.4, 1.4)
 any_angle = st.floats(-20.0, 20.0)
@@ -133,3 +134,16 @@ def test_a_rotation_vector_turns_about_its_axis() -> None:
     for vector in ([0.3, -0.2, 0.5], [0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.0, np.pi, 0.0]):
         np.testing.assert_allclose(rotation_from_vector(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
     assert np.array_equal(rotation_from_vector((0.0, 0.0, 0.0)), np.eye(3))
+
+
+@settings(deadline=None)
+@given(st.tuples(*[any_angle] * 3), st.tuples(*[st.floats(-0.02, 0.02)] * 3))
+def test_quaternions_turn_as_rotations_do(vector: tuple[float, ...], small: tuple[float, ...]) -> None:
+    first, step = Rotation.from_rotvec(vector), Rotation.from_rotvec(small)
+    q, both = first.as_quat(scalar_first=True), (first * step).as_quat(scalar_first=True)
+    for found in (multiply(q, small_turn(small)), turned(q, small)):
+        assert abs(np.dot(found, both)) == pytest.approx(1.0, abs=1e-9)
+        assert angle_between(found, both) == pytest.approx(0.0, abs=1e-5)
+    for sign in (1.0, -1.0):  # q and -q are one attitude
+        np.testing.assert_allclose(small_difference(q, sign * both), small, atol=1e-5)
+        assert angle_between(q, sign * both) == pytest.approx(np.linalg.norm(small), abs=1e-6)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -116,3 +118,9 @@ def test_px4_commands_the_thrusts_of_the_wrench(geometry: RotorGeometry, coeffic
 def test_hover_is_thrust_upwards_alone() -> None:
     setpoint = setpoint_scale(TAROT_T960, 52.56) * [0.0, 0.0, -58.86, 0.0, 0.0, 0.0]
     assert setpoint[2] == pytest.approx(-58.86 / (6 * 52.56 * np.cos(np.radians(30.0))), rel=1e-9)
+
+
+def test_the_former_name_of_the_module_works_with_a_warning() -> None:
+    sys.modules.pop("ibvs_qp.adapters.px4_rotors", None)
+    with pytest.warns(DeprecationWarning, match=r"px4_rotors is ibvs_qp\.adapters\.px4 now"):
+        assert importlib.import_module("ibvs_qp.adapters.px4_rotors").from_px4 is from_px4
