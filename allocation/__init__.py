@@ -1,14 +1,23 @@
 """Rotors to body wrench and back: geometry, effectiveness, allocation within limits, attainable wrenches."""
 
-from allocation.contact_reach import PushReach, hover_wrench, push_direction, push_reach, worst_push_reach
-from allocation.effectiveness import control_effectiveness
-from allocation.geometry import TAROT_T960, Rotor, RotorGeometry
-from allocation.hover_tilt import least_hover_tilt
-from allocation.least_squares import DEFAULT_ROW_WEIGHTS, allocate_least_squares
-from allocation.level_flight import level_polygon, worst_level_reach
-from allocation.pseudo_inverse import allocate_pseudo_inverse
-from allocation.sequential_desaturation import FULLY_ACTUATED_ORDER, allocate_px4, allocate_sequential
-from allocation.tilted_reach import tilted_push_reach, worst_tilted_push_reach
+from allocation.allocators import (
+    DEFAULT_ROW_WEIGHTS,
+    FULLY_ACTUATED_ORDER,
+    allocate_least_squares,
+    allocate_pseudo_inverse,
+    allocate_px4,
+    allocate_sequential,
+)
+from allocation.geometry import TAROT_T960, Rotor, RotorGeometry, control_effectiveness
+from allocation.hover import hover_wrench, least_hover_tilt, level_polygon, worst_level_reach
+from allocation.reach import (
+    PushReach,
+    push_direction,
+    push_reach,
+    tilted_push_reach,
+    worst_push_reach,
+    worst_tilted_push_reach,
+)
 from allocation.wrench_facets import WrenchFacets
 
 __all__ = [

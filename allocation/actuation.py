@@ -1,4 +1,4 @@
-"""What the rotors of a vehicle can do: actuated directions, hover, reach in level flight, and loss of a rotor."""
+"""Capabilities of the rotors of a vehicle: actuated directions, hover, reach in level flight, and loss of a rotor."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from allocation.contact_reach import PushReach, hover_wrench, push_reach, worst_push_reach
-from allocation.effectiveness import control_effectiveness
-from allocation.geometry import RotorGeometry
-from allocation.hover_tilt import least_hover_tilt
-from allocation.least_squares import allocate_least_squares
-from allocation.level_flight import worst_level_reach
+from allocation.allocators import allocate_least_squares
+from allocation.geometry import RotorGeometry, control_effectiveness
+from allocation.hover import hover_wrench, least_hover_tilt, worst_level_reach
+from allocation.reach import PushReach, push_reach, worst_push_reach
 from allocation.wrench_facets import WrenchFacets
 
-#: A singular value below this share of the largest counts as zero [-]: such a wrench needs 1,000 times the thrust.
+#: A singular value below this fraction of the largest counts as zero [-]: such a wrench needs 1,000 times the thrust.
 LEAST_SINGULAR = 1e-3
 #: Least mean lever that moments are divided by [m].
 LEAST_LEVER = 1e-3
@@ -29,7 +27,7 @@ DIRECTIONS = ("force front", "force right", "force down", "moment roll", "moment
 
 @dataclass(frozen=True, kw_only=True)
 class Actuation:
-    """What the rotors can do.
+    """Capabilities of rotors within their thrust limits.
 
     Attributes:
         effectiveness: B, (6, n).
@@ -119,7 +117,5 @@ def _in_words(direction: np.ndarray) -> str:
     """Components of a wrench direction, the largest first; those below a tenth of it are left out."""
     order = sorted(range(6), key=lambda index: -abs(direction[index]))
     largest = direction[order[0]]
-    shares = [(DIRECTIONS[index], direction[index] / largest) for index in order]
-    return " ".join(
-        name if place == 0 else f"{share:+.1f} {name}" for place, (name, share) in enumerate(shares) if abs(share) > 0.1
-    )
+    others = [(DIRECTIONS[index], direction[index] / largest) for index in order[1:]]
+    return " ".join((DIRECTIONS[order[0]], *(f"{part:+.1f} {name}" for name, part in others if abs(part) > 0.1)))

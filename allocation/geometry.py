@@ -1,4 +1,4 @@
-"""Positions, thrust axes and spins of the rotors: the one source of every rotor number."""
+"""Positions, thrust axes and spins of the rotors, the one source of every rotor number, and their wrench."""
 
 from __future__ import annotations
 
@@ -9,10 +9,55 @@ from typing import Any
 
 import numpy as np
 
-from allocation.rotor import LARGEST_M, Rotor, unit
-
 #: Most rotors: the program grows with them, and a vehicle with more is a mistake.
 MOST_ROTORS = 64
+#: Error of the length of a given axis, which is then normalised: three digits suffice [-].
+UNIT_TOLERANCE = 2e-3
+#: Fraction of x in an axis beyond which a direction of the disc is found from y instead [-].
+ALONG_X = 0.99
+#: Largest length in a geometry [m]: ten times the largest vehicle that hovers; products of far larger ones overflow.
+LARGEST_M = 100.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rotor:
+    """One fixed rotor: on the circle of its geometry by its azimuth, or with a position and an axis of its own.
+
+    Attributes:
+        name: Readable name, unique in its geometry.
+        azimuth_deg: Angle of the rotor arm from body +x towards the right (+y), seen from above [deg].
+        spin: +1 if the propeller turns counter-clockwise seen from above, -1 if clockwise.
+        position_m: Hub in the body frame FRD [m], (3,); None on the circle.
+        axis: Unit thrust axis in the body frame, (3,); None for the tilt of the geometry.
+        torque_ratio_m: Drag torque over thrust [m]; None for the geometry's.
+    """
+
+    name: str
+    azimuth_deg: float | None = None
+    spin: int
+    position_m: tuple[float, float, float] | None = None
+    axis: tuple[float, float, float] | None = None
+    torque_ratio_m: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse impossible rotors."""
+        place, axis, ratio = self.position_m, self.axis, self.torque_ratio_m
+        length = 1.0 if axis is None else float(np.linalg.norm(axis))
+        angle, most = self.azimuth_deg or 0.0, f"at most {LARGEST_M:g} m"
+        checks = (
+            (self.azimuth_deg is not None or bool(place and axis), "azimuth_deg, or position_m and axis, is needed"),
+            (abs(angle) <= 360.0, f"azimuth_deg: {angle} deg, must lie in [-360, 360] deg"),
+            (place is None or all(map(_near, place)), f"position_m: {place} m, must be finite, {most}"),
+            (abs(length - 1.0) <= UNIT_TOLERANCE, f"axis: {axis} has the length {length:g}, must be a unit vector"),
+            (ratio is None or 0 <= ratio <= LARGEST_M, f"torque_ratio_m: {ratio} m, must be >= 0 m, {most}"),
+        )
+        for good, message in checks:
+            if not good:
+                raise ValueError(f"{self.name}: {message}")
+
+
+def _near(value: float) -> bool:
+    return abs(value) <= LARGEST_M
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,6 +146,46 @@ def _replaced(rows: np.ndarray, own: Sequence[Any]) -> np.ndarray:
         if vector is not None:
             row[:] = vector
     return rows
+
+
+def unit(vector: Sequence[float]) -> np.ndarray:
+    """A vector divided by its length, (3,)."""
+    return np.array(vector) / np.linalg.norm(vector)
+
+
+def perpendicular(axis: np.ndarray) -> np.ndarray:
+    """A unit vector in the plane of a propeller disc with this axis, (3,)."""
+    side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[0]) > ALONG_X else [1.0, 0.0, 0.0])
+    return side / np.linalg.norm(side)
+
+
+def disc_rim(axis: np.ndarray, radius: float, points: int) -> np.ndarray:
+    """Points on the rim of a propeller disc, seen from its hub, (points, 3) [m]."""
+    side = perpendicular(axis)
+    angle = np.linspace(0.0, 2.0 * np.pi, points, endpoint=False)[:, None]
+    return radius * (np.cos(angle) * side + np.sin(angle) * np.cross(axis, side))
+
+
+def control_effectiveness(geometry: RotorGeometry) -> np.ndarray:
+    r"""Wrench of unit thrust of every rotor, at the centre of mass in the body frame (FRD).
+
+    Column i is :math:`[t_i;\; p_i \times t_i - s_i K_{M,i} t_i]` with hub position p, thrust axis t, spin s
+    (+1 counter-clockwise) and drag-torque ratio K_M of the rotor, the convention of PX4's rotor effectiveness.
+
+    Args:
+        geometry: The rotors.
+
+    Returns:
+        Matrix B of shape (6, n): force rows [-], moment rows [m].
+    """
+    axes, positions = geometry.axes, geometry.positions
+    moments = np.cross(positions, axes) - (geometry.spins * geometry.torque_ratios)[:, None] * axes
+    return np.vstack((axes.T, moments.T))
+
+
+def as_matrix(rotors: RotorGeometry | np.ndarray) -> np.ndarray:
+    """Control effectiveness B of shape (6, n), of a geometry or given as such."""
+    return control_effectiveness(rotors) if isinstance(rotors, RotorGeometry) else np.asarray(rotors, float)
 
 
 CLOCKWISE, COUNTER_CLOCKWISE = -1, 1

@@ -19,8 +19,10 @@ import math
 
 import numpy as np
 
-from allocation.effectiveness import as_matrix
-from allocation.geometry import RotorGeometry
+from allocation.geometry import RotorGeometry, as_matrix
+
+#: Thrust limit of all rotors [N], (n,), or one number.
+Limit = np.ndarray | float
 
 #: Singular values and coefficients below this fraction of the largest count as zero.
 RELATIVE_ZERO = 1e-9
@@ -50,9 +52,7 @@ class WrenchFacets:
         self.normals, self.coefficients = _normals(self.matrix)
         self._positive, self._negative = np.maximum(self.coefficients, 0.0), np.minimum(self.coefficients, 0.0)
 
-    def rooms(
-        self, wrench: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def rooms(self, wrench: np.ndarray, lower: Limit, upper: Limit) -> tuple[np.ndarray, np.ndarray]:
         """Distances of a wrench to the lower (<= 0 inside) and the upper plane (>= 0 inside) of every normal.
 
         Args:
@@ -73,21 +73,15 @@ class WrenchFacets:
         at = self.normals @ wrench
         return self._positive @ low + self._negative @ high - at, self._positive @ high + self._negative @ low - at
 
-    def contains(self, wrench: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> bool:
+    def contains(self, wrench: np.ndarray, lower: Limit, upper: Limit) -> bool:
         """Whether a wrench is attainable within the limits; arguments as in `rooms`."""
         low, high = self.rooms(wrench, lower, upper)
         return bool((low <= ON_PLANE).all() and (high >= -ON_PLANE).all())
 
-    def interval(
-        self, wrench: np.ndarray, direction: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float
-    ) -> tuple[float, float]:
+    def interval(self, wrench: np.ndarray, direction: np.ndarray, lower: Limit, upper: Limit) -> tuple[float, float]:
         r"""Least and greatest t with :math:`w + t\,d` attainable; (inf, -inf) when there is none.
 
-        Args:
-            wrench: Wrench w at t = 0, (6,) [N, N m].
-            direction: Direction d, (6,); t is in multiples of its length.
-            lower: Smallest thrusts, (n,) or one number [N].
-            upper: Largest thrusts, (n,) or one number [N].
+        Args: as of `rooms`; direction d, (6,), of which t is a multiple.
         """
         enter, leave = crossings(*self.rooms(wrench, lower, upper), self.normals @ direction)
         least, greatest = float(enter.max()), float(leave.min())

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from allocation.least_squares import allocate_least_squares
-from allocation.sequential_desaturation import allocate_sequential
+from allocation import allocate_least_squares, allocate_sequential
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
@@ -62,7 +61,7 @@ def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple
     """L and the commanded image acceleration: every line, and with `analytic_angle_row` the angle of the central one.
 
     Stacking the angle rows of a horizontal and a vertical line as printed makes their difference command pitch through
-    a lever of rho: measured, a vertical edge entering the picture pitched the vehicle by 14 degrees.
+    a lever of rho: measured, a vertical edge entering the image pitched the vehicle by 14 degrees.
     """
     at_tip = config.analytic_line_point == "tip"
     rows = [endpoint_line_row(line.matrix, line.theta, line.tip) if at_tip else line.matrix[0] for line in lines]
@@ -75,7 +74,7 @@ def _stacked_lines(lines: list[LineSetpoint], config: ControllerConfig) -> tuple
 
 
 def _pseudo_inverse(matrix: np.ndarray) -> np.ndarray:
-    """`numpy.linalg.pinv` of a small matrix to the bit, without its handling of stacks: half the time."""
+    """Bit-identical to `numpy.linalg.pinv` of a small matrix, without its handling of stacks: half the time."""
     left, singular, right = np.linalg.svd(matrix, full_matrices=False)
     values = singular.tolist()  # the largest first
     least = RANK_TOLERANCE * values[0]
@@ -88,28 +87,25 @@ def analytic_thrusts(setpoints: Setpoints) -> np.ndarray:
     return setpoints.inverse.dot(analytic_wrench(setpoints) - setpoints.bias_wrench)
 
 
-def allocate(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
-    """Thrusts within this tick's window by the configured allocator [N], (n,).
+def allocate(setpoints: Setpoints, free: np.ndarray, allocator: str = "") -> np.ndarray:
+    """Thrusts within this tick's window [N], (n,).
 
     Args:
         setpoints: Set-points of the tick, with the window.
         free: Thrusts of the desired wrench without limits [N], (n,), finite.
+        allocator: "clip", "sequential" or "box"; the configured one if empty.
     """
-    lower, upper, clipped = setpoints.lower, setpoints.upper, clip(setpoints, free)
-    if setpoints.config.allocator == "clip" or np.array_equal(clipped, free):
+    allocator, clipped = allocator or setpoints.config.allocator, clip(setpoints, free)
+    if allocator == "clip" or np.array_equal(clipped, free):
         return clipped
     matrix = setpoints.effectiveness
-    function = allocate_sequential if setpoints.config.allocator == "sequential" else allocate_least_squares
-    return function(matrix.dot(free), matrix, lower, upper)
+    function = allocate_sequential if allocator == "sequential" else allocate_least_squares
+    return function(matrix.dot(free), matrix, setpoints.lower, setpoints.upper)
 
 
 def allocate_in_box(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
     """Thrusts within this tick's window whose wrench is nearest [N], (n,): the allocator of the program's fallback."""
-    clipped = clip(setpoints, free)
-    if np.array_equal(clipped, free):
-        return clipped
-    matrix = setpoints.effectiveness
-    return allocate_least_squares(matrix.dot(free), matrix, setpoints.lower, setpoints.upper)
+    return allocate(setpoints, free, "box")
 
 
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:

@@ -1,7 +1,7 @@
 """ROS's axes (body front-left-up, world east-north-up) to ours (front-right-down, north-east-down), and back.
 
 Both exchanges of axes are rotations by half a turn, so one function serves both directions:
-``swap_axes(swap_axes(value))`` is the value. Lines, planes and pictures are in the camera's optical frame
+``swap_axes(swap_axes(value))`` is the value. Lines, planes and images are in the camera's optical frame
 (right-down-front), which ROS shares, and stay as they are; so does the reference in the wall plane (right, down).
 """
 
@@ -63,7 +63,7 @@ def swap_axes(value: Value) -> Value:
         value: In front-left-up and east-north-up, or in front-right-down and north-east-down.
 
     Returns:
-        The same in the other ones; stamps, lines, planes and pictures unchanged.
+        The same in the other ones; stamps, lines, planes and images unchanged.
 
     Raises:
         TypeError: For a value of another type.
@@ -85,7 +85,7 @@ def swap_axes(value: Value) -> Value:
 
 
 def _changed(value: Any, vectors: tuple[str, ...], **others: Any) -> Any:
-    """Copy with vectors swapped; None stays None, and what ``others`` change by a function of the old value."""
+    """Copy with vectors swapped and ``others`` replaced by a function of the old value; None stays None."""
     swapped = {name: swap_vector(old) for name in vectors if (old := getattr(value, name)) is not None}
     more = {name: swap(old) for name, swap in others.items() if (old := getattr(value, name)) is not None}
     return dataclasses.replace(value, **swapped, **more)

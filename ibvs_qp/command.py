@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import overload
+from typing import Any
 
 import numpy as np
 
@@ -75,13 +75,7 @@ class TaskReports(Sequence[TaskReport]):
         """Number of task rows with a weight."""
         return len(self._reports)
 
-    @overload
-    def __getitem__(self, index: int) -> TaskReport: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[TaskReport, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> TaskReport | tuple[TaskReport, ...]:
+    def __getitem__(self, index: Any) -> Any:
         """One report, or a tuple of them."""
         return self._reports[index]
 

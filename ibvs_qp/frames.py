@@ -19,6 +19,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ibvs_qp.quaternion import from_rotation_vector
+
 #: Standard gravity [m/s^2].
 GRAVITY = 9.81
 
@@ -88,17 +90,9 @@ def rotation_from_quaternion(quaternion: Iterable[float]) -> np.ndarray:
     return np.array(rotation_rows(*map(float, quaternion)))
 
 
-def quaternion_from_vector(vector: Sequence[float] | np.ndarray) -> tuple[float, float, float, float]:
-    """Quaternion (w, x, y, z) of a rotation vector (axis times angle [rad])."""
-    half = 0.5 * np.asarray(vector, float)
-    angle = float(np.linalg.norm(half))
-    x, y, z = (half * np.sinc(angle / math.pi)).tolist()
-    return math.cos(angle), x, y, z
-
-
 def rotation_from_vector(vector: Sequence[float] | np.ndarray) -> np.ndarray:
     """Rotation matrix of a rotation vector (axis times angle [rad]), shape (3, 3)."""
-    return rotation_from_quaternion(quaternion_from_vector(vector))
+    return rotation_from_quaternion(from_rotation_vector(vector))
 
 
 def down_in_body(quaternion: Iterable[float]) -> Vector3:

@@ -1,7 +1,7 @@
 """Inputs: sensor frames for the pilot, measurements and references for a controller.
 
 All are frozen keyword-only dataclasses in float64 and SI units; stamps are integer nanoseconds of one monotonic
-clock. They are plain carriers: a controller checks them itself, because in flight nothing may raise.
+clock. They are plain carriers: a controller checks them itself, because no step may raise in flight.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ HORIZONTAL, VERTICAL = "horizontal", "vertical"
 
 @dataclass(frozen=True, kw_only=True)
 class LineFeature:
-    """One line seen in the image, x cos(theta) + y sin(theta) = rho in normalised coordinates.
+    """One line in the image, x cos(theta) + y sin(theta) = rho in normalised coordinates.
 
     Attributes:
         rho: Signed distance of the line from the image centre [-].
@@ -69,7 +69,7 @@ class Measurement:
         velocity: Linear velocity in B [m/s], (3,), or None.
         velocity_covariance: Of the velocity, (3, 3), or None.
         acceleration_bias: Specific force plus gravity by the attitude, minus the true acceleration, in B [m/s^2],
-            (3,), or None: what the caller's velocity filter learnt. Its part along the wall counts.
+            (3,), or None: the estimate of the caller's velocity filter. Only its part along the wall is used.
         thrust_min: Lower thrust limits [N], (n,), or None for the configured ones.
         thrust_max: Upper thrust limits [N], (n,), or None for the configured ones.
         attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
@@ -111,7 +111,7 @@ class Reference:
             begins.
         tilt: Roll and pitch [rad], (2,): level, except for a vehicle that lost a rotor. Then only the tilt moves it.
         trim: Roll and pitch [rad], (2,), at which a vehicle with a limited rotor hovers without a lateral force; it is
-            flown like a level one.
+            controlled like a level one.
     """
 
     push_force: float = 0.0
@@ -126,7 +126,7 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class RgbdFrame:
-    """One registered colour and depth picture; the Pilot also takes raw ones, of the camera in its ``[camera]``.
+    """One registered colour and depth image; the Pilot also takes raw ones, of the camera in its ``[camera]``.
 
     Attributes:
         rgb: uint8 (H, W, 3).
@@ -143,7 +143,7 @@ class RgbdFrame:
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureFrame:
-    """Result of perception on one picture.
+    """Result of perception on one image.
 
     Attributes:
         lines: Lines at the time of capture.
@@ -173,7 +173,7 @@ class SensorFrame:
         specific_force: Accelerometer in B [m/s^2], (3,).
         wrench: Raw F/T sample at the sensor, FRD axes, vehicle on tool [N, N m], (6,).
         wrench_stamp_ns: Time at which that sample was taken.
-        image: A new picture, or None.
+        image: A new image, or None.
         features: Result of perception instead of an image, or None.
         attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
         imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.adapters.px4_rotors import MOST_PX4_ROTORS
-from ibvs_qp.adapters.px4_setpoints import setpoint_scale
+from ibvs_qp.adapters.px4 import MOST_PX4_ROTORS, setpoint_scale
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import Participant
 from ibvs_qp.command import Command

@@ -14,28 +14,23 @@ from pathlib import Path
 import numpy as np
 
 from allocation import control_effectiveness
-from ibvs_qp.config.angular_rate import AngularRateSettings
-from ibvs_qp.config.brush import BrushSettings
-from ibvs_qp.config.contact import ContactSettings
-from ibvs_qp.config.contact_margin import require_margin
-from ibvs_qp.config.derived import derive
+from ibvs_qp.config import contact_margin
+from ibvs_qp.config.contact import BrushSettings, ContactSettings, contact_values
 from ibvs_qp.config.errors import out_of_range
-from ibvs_qp.config.from_vehicle import contact_depth, contact_values, limit_values
-from ibvs_qp.config.gain_scaling import LAWS, scaled_gains
-from ibvs_qp.config.gains import Gains
-from ibvs_qp.config.limits import LimitSettings
-from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.config.estimation import AngularRateSettings
+from ibvs_qp.config.gains import LAWS, Gains, Weights, scaled_gains
+from ibvs_qp.config.limits import LimitSettings, limit_values
+from ibvs_qp.config.settings import Checked, choice, derive, dump_toml, load_toml, setting
 from ibvs_qp.config.solver import SolverSettings
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.config.weights import Weights
 
 #: No estimator or filter takes a tick to last longer than this [s]: after a pause they go on from where they were.
 LONGEST_TICK = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class ControllerConfig:
-    """Configuration of a controller; the default flies the Tarot T960."""
+class ControllerConfig(Checked):
+    """Configuration of a controller; the default is the Tarot T960."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
     gains: Gains = field(default_factory=Gains)
@@ -46,28 +41,21 @@ class ControllerConfig:
     solver: SolverSettings = field(default_factory=SolverSettings)
     brush: BrushSettings = field(default_factory=BrushSettings)
     gains_of: str = choice(
-        "qp", "law whose tuned gains, scaled to the vehicle, are those that are not stated; a pilot's own law", LAWS
+        "qp", "law whose tuned gains, scaled to the vehicle, are the defaults; a pilot sets its own", LAWS
     )
     line_profile: str = choice(
-        "tip",
-        "error of the line rows: at the point where the tip meets the wall, or the paper's, rho at the image centre",
-        ("tip", "paper"),
+        "tip", "point of the line error: where the tip meets the wall, or the paper's image centre", ("tip", "paper")
     )
     analytic_line_point: str = choice(
         "tip",
-        "error of the analytic law's line rows: at the point where the tip meets the wall, or rho at the image centre, "
-        "as printed",
+        "the same of the analytic law: where the tip meets the wall, or rho at the image centre, as printed",
         ("tip", "centre"),
     )
     analytic_angle_row: bool = setting(
-        False,
-        "angle row of the analytic law, as printed; False: level flight alone fixes roll, its peak falls to a third "
-        "(theta_kp = 0 still takes roll from it)",
+        False, "angle row of the analytic law, as printed; without it the level rows fix roll, with a third of its peak"
     )
     line_slots: int = setting(3, "lines the fixed program has room for; each costs 500 instructions", low=1, high=16)
-    tick_s: float = setting(
-        0.004, "control period; a longer tick than 0.02 s is taken for a pause", unit="s", low=0.0005, high=LONGEST_TICK
-    )
+    tick_s: float = setting(0.004, "control period; beyond 0.02 s it is a pause", "s", 0.0005, LONGEST_TICK)
     impedance: bool = setting(True, "impedance terms of the force law (False: direct force control)")
     contact_feedforward: bool = setting(True, "feed the measured contact moment and expected friction forward")
     touch_ramp: bool = setting(True, "ramp lambda and the force reference after touch")
@@ -78,14 +66,13 @@ class ControllerConfig:
     )
     allocator: str = choice(
         "clip",
-        "allocation of the analytic law where a rotor reaches a limit: the paper's clipping, sequential desaturation "
-        "(lateral force yields first), or weighted least squares within the limits",
+        "allocator of the analytic law: the paper's clipping, sequential desaturation, or bounded least squares",
         ("clip", "sequential", "box"),
     )
 
     def __post_init__(self) -> None:
         """Derive what follows from the vehicle, and validate: it is fully actuated, and a push can begin."""
-        validate(self)
+        super().__post_init__()
         object.__setattr__(self, "gains", derive(self.gains, scaled_gains(self.vehicle, self.gains_of)))
         object.__setattr__(self, "contact", derive(self.contact, contact_values(self.vehicle)))
         object.__setattr__(self, "limits", derive(self.limits, limit_values(self.vehicle, self.limits.view_margin)))
@@ -93,13 +80,13 @@ class ControllerConfig:
         if (rank := int(np.linalg.matrix_rank(matrix))) < len(matrix):
             needed = f"they give {rank} of 6 directions of a wrench; 'ibvs-qp vehicle FILE' names the others"
             raise out_of_range("vehicle.geometry", self.vehicle.geometry.count, "rotors", needed)
-        arm = round(contact_depth(self.vehicle), 9)
+        arm = round(self.vehicle.contact_depth_m, 9)
         if self.contact.depth_min_m < arm:
             allowed = f"allowed is at least {arm:g} m, where the camera is when the tip touches"
             raise out_of_range("contact.depth_min_m", self.contact.depth_min_m, "m", allowed)
 
     def on_backend(self, backend: str) -> ControllerConfig:
-        """The same with another solver backend."""
+        """The same configuration with another solver backend."""
         return dataclasses.replace(self, solver=dataclasses.replace(self.solver, backend=backend))
 
     @property
@@ -111,9 +98,9 @@ class ControllerConfig:
     def from_toml(cls, file: str | Path) -> ControllerConfig:
         """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
         config = load_toml(cls, file)
-        require_margin(config, config.brush, f"{file}: ")
+        contact_margin.require_margin(config, config.brush, f"{file}: ")
         return config
 
     def to_toml(self, *, derived: bool = False) -> str:
-        """Write the configuration as TOML text; with ``derived`` also what follows from the rest, for a record."""
+        """Write the configuration as TOML text; with ``derived`` also the derived values, for a record."""
         return dump_toml(self, derived=derived)

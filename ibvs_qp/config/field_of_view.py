@@ -1,4 +1,4 @@
-"""What a camera on its mount has in the picture, in the axes C of one that looks along +x."""
+"""Field of view of a camera on its mount, in the axes C of one that looks along +x."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
 
-#: Least depth in C of a ray per length [-]: 84 deg off the axis of C; what lies beyond it is taken to lie there.
+#: Least depth in C of a ray per length [-]: 84 deg off the axis of C; rays beyond it are moved there.
 _LEAST_DEPTH = 0.1
 
 
 class FieldOfView(NamedTuple):
-    """Ends of the picture along the level and the upright line through its middle, normalised, in C."""
+    """Ends of the image along the level and the upright line through its middle, normalised, in C."""
 
     left: float
     right: float
@@ -31,10 +31,10 @@ def camera_rotation(turn_deg: Sequence[float]) -> np.ndarray:
 def straightened_intrinsics(
     intrinsics: Sequence[float], size: tuple[float, float], rotation: np.ndarray
 ) -> tuple[float, float, float, float]:
-    """Intrinsics of the straightened picture: the middle of the real one stays in the middle.
+    """Intrinsics of the straightened image: the middle of the real one stays in the middle.
 
     Args:
-        intrinsics: (fx, fy, cx, cy) of the real picture [px].
+        intrinsics: (fx, fy, cx, cy) of the real image [px].
         size: Width and height [px].
         rotation: From the axes of the real camera to C, (3, 3).
     """
@@ -47,12 +47,12 @@ def straightened_intrinsics(
 
 
 def picture_outline(vehicle: VehicleParams) -> np.ndarray:
-    """Corners of the real picture, normalised, in C, (4, 2), in order around it."""
+    """Corners of the real image, normalised, in C, (4, 2), in order around it."""
     return _ahead(_corners(vehicle.camera_size_px, vehicle.camera_intrinsics_px) @ _rotation(vehicle).T)
 
 
 def field_of_view(vehicle: VehicleParams) -> FieldOfView:
-    """What the straightened picture holds of the level and the upright line through its middle.
+    """Field of view of the straightened image along the level and the upright line through its middle.
 
     Args:
         vehicle: Gives the camera's size, intrinsics and turn.
@@ -70,7 +70,7 @@ def _rotation(vehicle: VehicleParams) -> np.ndarray:
 
 
 def _corners(size: tuple[float, float], intrinsics: Sequence[float]) -> np.ndarray:
-    """Rays to the corners of a picture, whose pixels have their centres at integers, (4, 3)."""
+    """Rays to the corners of an image, whose pixels have their centres at integers, (4, 3)."""
     fx, fy, cx, cy = intrinsics
     left, right, up, down = (-0.5 - cx) / fx, (size[0] - 0.5 - cx) / fx, (-0.5 - cy) / fy, (size[1] - 0.5 - cy) / fy
     return np.array(((left, up, 1.0), (right, up, 1.0), (right, down, 1.0), (left, down, 1.0)))
@@ -86,6 +86,6 @@ def _crossings(outline: np.ndarray, axis: int, value: float) -> tuple[float, flo
     found = []
     for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         if (a[axis] < value) != (b[axis] < value):
-            share = (value - a[axis]) / (b[axis] - a[axis])
-            found.append(float(a[1 - axis] + share * (b[1 - axis] - a[1 - axis])))
+            part = (value - a[axis]) / (b[axis] - a[axis])
+            found.append(float(a[1 - axis] + part * (b[1 - axis] - a[1 - axis])))
     return (min(found), max(found)) if found else (value, value)

@@ -7,7 +7,6 @@ and `choice`. The same metadata validates a value, explains its error, and docum
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import math
 import numbers
@@ -16,23 +15,24 @@ import typing
 from pathlib import Path
 from typing import Any, TypeVar
 
-import tomli_w
-
-from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.errors import ConfigError, out_of_range, shown
-from ibvs_qp.config.toml_text import read_toml
+from ibvs_qp.config.files import read_toml
 
 T = TypeVar("T")
+
+
+class Derived(float):
+    """A number that follows from the vehicle: computed anew for another vehicle, and left out of TOML files."""
 
 
 def setting(
     default: Any,
     doc: str,
-    *,
     unit: str = "",
-    why: str = "",
     low: float = -math.inf,
     high: float = math.inf,
+    *,
+    why: str = "",
     words: tuple[str, ...] = (),
 ) -> Any:
     """Declare a settings field with its unit and closed allowed range [low, high].
@@ -41,9 +41,9 @@ def setting(
         default: Number, boolean, string, or tuple of numbers; None for a value that follows from others.
         doc: Meaning, and source of the value unless ``why`` gives it.
         unit: SI unit, empty for a pure number.
-        why: Reason for the default.
         low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
+        why: Reason for the default.
         words: Strings that are allowed beside numbers.
     """
     limits = {"low": low, "high": high, "words": words}
@@ -55,14 +55,14 @@ def choice(default: str, doc: str, options: tuple[str, ...]) -> Any:
     return dataclasses.field(default=default, metadata={"doc": doc, "unit": "", "options": options})
 
 
-def validate(instance: Any, prefix: str = "") -> None:
+def validate(instance: Any) -> None:
     """Check every field of a settings dataclass against its metadata.
 
     Raises:
         ConfigError: Naming field, value, unit and allowed range.
     """
     for field in dataclasses.fields(instance):
-        meta, value, name = field.metadata, getattr(instance, field.name), prefix + field.name
+        meta, value, name = field.metadata, getattr(instance, field.name), field.name
         if "options" in meta:
             if value not in meta["options"]:
                 raise out_of_range(name, value, "", "allowed are " + ", ".join(meta["options"]))
@@ -94,6 +94,25 @@ def require_order(instance: Any, smaller: str, larger: str, reason: str) -> None
     if low is not None and high is not None and not low < high:
         unit = next(field.metadata["unit"] for field in dataclasses.fields(instance) if field.name == larger)
         raise out_of_range(smaller, low, unit, f"must lie below {larger} = {high!r} {unit}: {reason}")
+
+
+def derive(section: T, values: dict[str, float]) -> T:
+    """A settings section with derived values where none is stated.
+
+    Args:
+        section: A settings dataclass; a field that is None or `Derived` is not stated.
+        values: Derived values by field.
+    """
+    own: dict[str, Any] = {name: getattr(section, name) for name in values}
+    open_ones = {name: Derived(values[name]) for name, value in own.items() if value is None or type(value) is Derived}
+    return dataclasses.replace(section, **open_ones)  # type: ignore[type-var]
+
+
+def stated(section: T) -> T:
+    """The same section with its derived values as if they were stated."""
+    values = {field.name: getattr(section, field.name) for field in dataclasses.fields(section)}  # type: ignore[arg-type]
+    fixed: dict[str, Any] = {name: float(value) for name, value in values.items() if type(value) is Derived}
+    return dataclasses.replace(section, **fixed)  # type: ignore[type-var]
 
 
 def _check_number(name: str, value: Any, default: Any, meta: typing.Mapping[str, Any]) -> None:
@@ -133,6 +152,8 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
     for key, value in table.items():
         place = f"{path}.{key}" if path else key
         if key not in known:
+            import difflib
+
             near = difflib.get_close_matches(key, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else f"; known keys: {', '.join(known)}"
             raise ConfigError(f"unknown key {shown(place)}{hint}")
@@ -141,10 +162,7 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         return kind(**values)
     except ConfigError as error:
         raise ConfigError(f"{path}.{error}" if path and not str(error).startswith(path + ".") else str(error)) from None
-    except (
-        TypeError,
-        ValueError,
-    ) as error:  # from a dataclass of another package, or for a missing field without default
+    except (TypeError, ValueError) as error:  # a dataclass of another package, or a missing field without default
         raise ConfigError(f"{path or 'table'}: {error}") from None
 
 
@@ -231,4 +249,6 @@ def load_toml(kind: type[T], file: str | Path) -> T:
 
 def dump_toml(instance: Any, *, derived: bool = False) -> str:
     """Write a settings tree as TOML text; `load_toml` restores an equal tree. Arguments as for `to_dict`."""
+    import tomli_w  # not needed to control, and missing in a light installation
+
     return tomli_w.dumps(to_dict(instance, derived=derived))

@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.config.settings import Checked, choice, setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolverSettings:
+class SolverSettings(Checked):
     """OSQP and the acceptance test; the values are measured on recorded flights (docs/how_it_works/qp.md)."""
 
     max_iterations: int = setting(500, "deterministic deadline; an iteration takes about 0.5 us", low=1, high=100000)
     tolerance: float = setting(1e-6, "eps_abs; leaves at most 1e-3 N in the softest direction", low=1e-10, high=1e-1)
-    relative_tolerance: float = setting(
-        0.0, "eps_rel; it would relax the test in the soft directions", low=0.0, high=1e-1
-    )
+    relative_tolerance: float = setting(0.0, "eps_rel; relaxes the test in soft directions", low=0.0, high=1e-1)
     check_interval: int = setting(5, "iterations between termination checks", low=1, high=1000)
     adaptive_rho_interval: int = setting(20, "iterations between step-size updates; 10 oscillate", low=1, high=10000)
-    adaptive_rho_tolerance: float = setting(
-        2.0, "change of the step size that triggers its update", low=1.0, high=100.0
-    )
-    scaling: int = setting(
-        2, "Ruiz equilibration passes; without, or with ten, some ticks end at the cap", low=0, high=100
-    )
+    adaptive_rho_tolerance: float = setting(2.0, "step-size change that triggers an update", low=1.0, high=100.0)
+    scaling: int = setting(2, "Ruiz equilibration passes; with 0 or 10 some ticks end at the cap", low=0, high=100)
     backend: str = choice(
         "python",
-        "OSQP's Python extension and interpreted equations, or both as C code that is compiled once where there is a "
-        "compiler: the same thrusts in a third of the time",
+        "solver and equations in Python, or as C code compiled once: same thrusts, a third of the time",
         ("python", "compiled"),
     )
     direct: bool = setting(True, "call OSQP's extension object (half the overhead) instead of its wrapper")
-    accept_residual: float = setting(
-        1e-3, "largest residual of an accepted early stop, as thrust", unit="N", low=1e-9, high=10.0
-    )
-    recovery_ticks: int = setting(
-        25, "good solutions in a row before the program flies again after none: 0.1 s", low=0, high=10000
-    )
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        validate(self)
+    accept_residual: float = setting(1e-3, "largest residual of an accepted early stop, as thrust", "N", 1e-9, 10.0)
+    recovery_ticks: int = setting(25, "good solutions in a row until QP control resumes: 0.1 s", low=0, high=10000)

@@ -6,99 +6,62 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from allocation.geometry import TAROT_T960, RotorGeometry
+from allocation import TAROT_T960, RotorGeometry
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.config.settings import require_order, setting, validate
+from ibvs_qp.config.settings import Checked, require_order, setting
 
 #: Rounding of the largest moment of inertia against the sum of the others [-]: equal for a flat body.
 INERTIA_TOLERANCE = 1e-9
 #: Shortest focal length [px].
 SHORTEST_PX = 1.0
+#: Yaw angles at which the clearance of the propellers is computed [deg].
+_YAWS_DEG = np.linspace(0.0, 60.0, 1201)
+
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class VehicleParams:
+class VehicleParams(Checked):
     """The tilted hexarotor with its arm, tool, force/torque sensor and camera (positions FRD from the centre of mass).
 
     Nominal values: the Tarot T960 of the paper, with the arm and tool assumed here.
     """
 
     geometry: RotorGeometry = TAROT_T960
-    mass_kg: float = setting(6.0, "all-up mass, tool included", unit="kg", low=0.5, high=50.0)
-    inertia_kg_m2: tuple[float, float, float] = setting(
-        (0.22, 0.30, 0.48),
-        "moments xx, yy, zz of the inertia about the centre of mass",
-        unit="kg m^2",
-        low=1e-3,
-        high=50.0,
+    mass_kg: float = setting(6.0, "all-up mass, tool included", "kg", 0.5, 50.0)
+    inertia_kg_m2: Vector = setting(
+        (0.22, 0.30, 0.48), "inertia xx, yy, zz about the centre of mass", "kg m^2", 1e-3, 50.0
     )
-    inertia_products_kg_m2: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "entries xy, xz, yz of the same inertia matrix", unit="kg m^2", low=-25.0, high=25.0
-    )
+    inertia_products_kg_m2: Vector = setting((0.0, 0.0, 0.0), "entries xy, xz, yz", "kg m^2", -25.0, 25.0)
     thrust_min_n: float | tuple[float, ...] = setting(
-        1.2,
-        "idle thrust of a rotor",
-        unit="N",
-        why="15 % of full speed, because a stopped propeller starts late",
-        low=0.0,
-        high=200.0,
+        1.2, "idle thrust of a rotor", "N", 0.0, 200.0, why="15 % of full speed: stopped propellers start late"
     )
     thrust_max_n: float | tuple[float, ...] = setting(
-        52.56,
-        "full thrust of a rotor",
-        unit="N",
-        why="KDE 4215XF with a 15 inch propeller, published with the vehicle",
-        low=0.0,
-        high=200.0,
+        52.56, "full thrust of a rotor", "N", 0.0, 200.0, why="KDE 4215XF, 15 inch propeller, as published"
     )
     thrust_rate_n_s: float = setting(
-        500.0,
-        "fastest commanded thrust change",
-        unit="N/s",
-        why="2 N a tick: faster than the motors' lag of 57 ms, without jumps",
-        low=1.0,
-        high=1e5,
+        500.0, "fastest commanded thrust change", "N/s", 1.0, 1e5, why="2 N a tick: faster than the motors, no jumps"
     )
-    motor_lag_up_s: float = setting(0.045, "first-order lag of rising thrust", unit="s", low=1e-3, high=0.5)
-    motor_lag_down_s: float = setting(0.070, "first-order lag of falling thrust", unit="s", low=1e-3, high=0.5)
-    propeller_radius_m: float = setting(0.19, "propeller disc (15 inch)", unit="m", low=0.01, high=1.0)
-    linear_drag_n_s_m: float = setting(0.9, "drag per airspeed", unit="N s/m", low=0.0, high=20.0)
-    tip_position_m: tuple[float, float, float] = setting((0.70, 0.0, 0.0), "brush tip", unit="m", low=-3.0, high=3.0)
-    force_torque_position_m: tuple[float, float, float] = setting(
-        (0.25, 0.0, 0.0), "force/torque sensor", unit="m", low=-3.0, high=3.0
-    )
-    force_torque_turn_deg: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "turn of its axes from those of B, rotation vector", unit="deg", low=-180.0, high=180.0
-    )
-    tool_mass_kg: float = setting(0.35, "mass beyond the force/torque sensor", unit="kg", low=0.0, high=5.0)
-    tool_position_m: tuple[float, float, float] = setting(
-        (0.50, 0.0, 0.0), "centre of mass of the tool", unit="m", low=-3.0, high=3.0
-    )
-    arm_radius_m: float = setting(0.015, "radius of the arm", unit="m", low=0.001, high=0.2)
-    camera_position_m: tuple[float, float, float] = setting(
-        (0.20, 0.0, 0.08), "camera centre", unit="m", low=-3.0, high=3.0
-    )
-    camera_turn_deg: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0),
-        "turn of the camera from looking along +x, rotation vector in B",
-        unit="deg",
-        low=-180.0,
-        high=180.0,
-    )
-    camera_size_px: tuple[int, int] = setting(
-        (640, 480), "width and height of the picture", unit="px", low=32, high=8192
-    )
+    motor_lag_up_s: float = setting(0.045, "first-order lag of rising thrust", "s", 1e-3, 0.5)
+    motor_lag_down_s: float = setting(0.070, "first-order lag of falling thrust", "s", 1e-3, 0.5)
+    propeller_radius_m: float = setting(0.19, "propeller disc (15 inch)", "m", 0.01, 1.0)
+    linear_drag_n_s_m: float = setting(0.9, "drag per airspeed", "N s/m", 0.0, 20.0)
+    tip_position_m: Vector = setting((0.70, 0.0, 0.0), "brush tip", "m", -3.0, 3.0)
+    force_torque_position_m: Vector = setting((0.25, 0.0, 0.0), "force/torque sensor", "m", -3.0, 3.0)
+    force_torque_turn_deg: Vector = setting((0.0, 0.0, 0.0), "its turn, rotation vector in B", "deg", -180.0, 180.0)
+    tool_mass_kg: float = setting(0.35, "mass beyond the force/torque sensor", "kg", 0.0, 5.0)
+    tool_position_m: Vector = setting((0.50, 0.0, 0.0), "centre of mass of the tool", "m", -3.0, 3.0)
+    arm_radius_m: float = setting(0.015, "radius of the arm", "m", 0.001, 0.2)
+    camera_position_m: Vector = setting((0.20, 0.0, 0.08), "camera centre", "m", -3.0, 3.0)
+    camera_turn_deg: Vector = setting((0.0, 0.0, 0.0), "its turn from +x, rotation vector in B", "deg", -180.0, 180.0)
+    camera_size_px: tuple[int, int] = setting((640, 480), "width and height of the image", "px", 32, 8192)
     camera_intrinsics_px: tuple[float, float, float, float] = setting(
-        (625.22, 625.22, 319.5, 239.5),
-        "fx, fy, cx, cy of the colour camera, pixel centres at integers; 42 deg upright",
-        unit="px",
-        low=-1e5,
-        high=1e5,
+        (625.22, 625.22, 319.5, 239.5), "fx, fy, cx, cy; pixel centres at integers", "px", -1e5, 1e5
     )
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        validate(self)
+        super().__post_init__()
         require_order(self, "tool_mass_kg", "mass_kg", "the tool is part of the vehicle")
         if min(self.camera_intrinsics_px[:2]) < SHORTEST_PX:
             allowed = f"focal lengths must be at least {SHORTEST_PX:g} px"
@@ -141,3 +104,22 @@ class VehicleParams:
         matrix = self.mass_kg * np.eye(6)
         matrix[3:, 3:] = self.inertia
         return matrix
+
+    @property
+    def contact_depth_m(self) -> float:
+        """Camera to wall in contact, of a level vehicle square to the wall [m]."""
+        return self.tip_position_m[0] - self.camera_position_m[0]
+
+    @property
+    def strike_yaw_deg(self) -> float:
+        r"""Yaw, with the tip on the wall, at which the first propeller strikes it [deg]; 0 if one does at no yaw.
+
+        A disc with hub p, axis t and radius r reaches :math:`n \cdot p + r\sqrt{1 - (n \cdot t)^2}` along the wall's
+        normal n, the tip :math:`n \cdot x`.
+        """
+        yaw = np.radians(np.concatenate((_YAWS_DEG, -_YAWS_DEG)))
+        normals = np.column_stack((np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))))
+        hubs, axes = normals @ self.geometry.positions.T, normals @ self.geometry.axes.T
+        reach = (hubs + self.propeller_radius_m * np.sqrt(np.maximum(1.0 - axes**2, 0.0))).max(axis=1)
+        struck = (reach >= normals @ np.array(self.tip_position_m)).reshape(2, -1).any(axis=0)
+        return float(_YAWS_DEG[int(np.argmax(struck))]) if struck.any() else float(_YAWS_DEG[-1])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ibvs_qp.quaternion import Quaternion, angle_between, conjugate, multiply, normalized
+
 #: Least difference between an attitude and the one predicted by the gyro that is a step [rad], and least one in root
 #: mean squares of that difference [-]: noise that counts as steps makes the attitude a random walk, 20 deg in 30 s at
 #: 0.3 deg a sample.
@@ -16,7 +18,6 @@ NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
 #: the direction of gravity.
 RETURN_RATE = math.radians(0.5)
 
-Quaternion = tuple[float, float, float, float]
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -51,15 +52,15 @@ class AttitudeSteps:
         measured = (w, x, y, z)
         last = self._last or measured
         half = 0.5 * dt
-        predicted = _product(last, (1.0, half * rate[0], half * rate[1], half * rate[2]))
+        predicted = multiply(last, (1.0, half * rate[0], half * rate[1], half * rate[2]))
         if self.offset is not IDENTITY:
             self._give_back(dt)
-        given = measured if self.offset is IDENTITY else _product(measured, self.offset)
-        step, gate = _angle(predicted, given), max(STEP, STEP_SIGMAS * math.sqrt(self._power))
+        given = measured if self.offset is IDENTITY else multiply(measured, self.offset)
+        step, gate = angle_between(predicted, given), max(STEP, STEP_SIGMAS * math.sqrt(self._power))
         self._power += min(dt, LONGEST_SAMPLE) / NOISE_TIME * (min(step, gate, MOST_NOISE) ** 2 - self._power)
         if step > gate:
-            self.offset = _unit(_product(_inverse(measured), predicted))
-            given = _unit(predicted)
+            self.offset = normalized(multiply(conjugate(measured), predicted))
+            given = normalized(predicted)
         self._last = given
         return None if self.offset is IDENTITY else list(given)
 
@@ -74,30 +75,3 @@ class AttitudeSteps:
             return
         scale = math.copysign(math.sin(0.5 * left) / sine, w)
         self.offset = (math.cos(0.5 * left), vector[0] * scale, vector[1] * scale, vector[2] * scale)
-
-
-def _angle(first: Quaternion, second: Quaternion) -> float:
-    """Angle between two attitudes [rad]."""
-    w, *vector = _product(_inverse(first), second)
-    return 2.0 * math.atan2(math.hypot(*vector), abs(w))
-
-
-def _product(first: Quaternion, second: Quaternion) -> Quaternion:
-    (a, b, c, d), (e, f, g, h) = first, second
-    return (
-        a * e - b * f - c * g - d * h,
-        a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f,
-        a * h + b * g - c * f + d * e,
-    )
-
-
-def _inverse(quaternion: Quaternion) -> Quaternion:
-    w, x, y, z = quaternion
-    return (w, -x, -y, -z)
-
-
-def _unit(quaternion: Quaternion) -> Quaternion:
-    length = math.hypot(*quaternion)
-    w, x, y, z = quaternion
-    return (w / length, x / length, y / length, z / length)

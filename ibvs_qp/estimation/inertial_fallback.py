@@ -9,8 +9,9 @@ import numpy as np
 
 from ibvs_qp.estimation.kalman import DelayedKalman
 from ibvs_qp.estimation.wall_lines import WallAxes, wall_line
-from ibvs_qp.frames import Vector3, add_scaled, cross, plane_in_body
+from ibvs_qp.frames import Vector3, add_scaled, cross, down_in_body, plane_in_body
 from ibvs_qp.measurement import FeatureFrame
+from ibvs_qp.quaternion import small_difference, turned
 
 #: Order of the filter's state: rotation since the failure [rad], rate [rad/s], unmodelled acceleration [rad/s^2].
 ANGLE, RATE, BIAS = 0, 3, 6
@@ -119,9 +120,9 @@ class InertialFallback:
             for axis in range(3):
                 self._filter.correct_entry(stamp_ns, RATE + axis, rate[axis], GYRO_STD**2)
         if attitude is not None:
-            for axis, angle in enumerate(_rotation_vector(self._start, attitude)):
+            for axis, angle in enumerate(small_difference(self._start, attitude)):
                 self._filter.correct_entry(stamp_ns, ANGLE + axis, angle, ATTITUDE_STD**2)
-        self.attitude = _rotated(self._start, self._filter.state[ANGLE : ANGLE + 3].tolist())
+        self.attitude = list(turned(self._start, self._filter.state[ANGLE : ANGLE + 3].tolist()))
 
     def correct(self, frame: FeatureFrame, distance: float) -> None:
         """Correct with the wall's plane and lines of a picture at its capture; distance of the tip then [m]."""
@@ -129,46 +130,18 @@ class InertialFallback:
             return
         normal, _ = plane_in_body(frame.plane, self._tip_from_camera)
         self._corrected = max(self._corrected, frame.stamp_ns)
-        turned = cross(self._normal, add_scaled(self._normal, -1.0, normal))
+        turn = cross(self._normal, add_scaled(self._normal, -1.0, normal))
         for axis in (1, 2):
-            self._filter.correct_entry(frame.stamp_ns, ANGLE + axis, turned[axis], PICTURE_STD**2)
+            self._filter.correct_entry(frame.stamp_ns, ANGLE + axis, turn[axis], PICTURE_STD**2)
         for line in frame.lines:
             past = self._filter.at(frame.stamp_ns)
             if past is None:
                 return
             roll = float(past[ANGLE])
-            down = _down(_rotated(self._start, past[ANGLE : ANGLE + 3].tolist()))
+            down = down_in_body(turned(self._start, past[ANGLE : ANGLE + 3].tolist()))
             measured = wall_line(line, WallAxes.of(normal, down), self._tip_from_camera, distance)
             if measured is None:
                 continue
             expected = self._angles.setdefault(line.track_id, measured.angle)
             self._filter.correct_entry(frame.stamp_ns, ANGLE, roll + expected - measured.angle, PICTURE_STD**2)
-        self.attitude = _rotated(self._start, self._filter.state[ANGLE : ANGLE + 3].tolist())
-
-
-def _rotated(attitude: Sequence[float], vector: Sequence[float]) -> list[float]:
-    """Attitude turned by a rotation vector in B [rad]."""
-    angle = math.hypot(*vector)
-    scale = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
-    (a, b, c, d), e = attitude, math.cos(0.5 * angle)
-    f, g, h = (scale * entry for entry in vector)
-    return [
-        a * e - b * f - c * g - d * h,
-        a * f + b * e + c * h - d * g,
-        a * g - b * h + c * e + d * f,
-        a * h + b * g - c * f + d * e,
-    ]
-
-
-def _rotation_vector(first: Sequence[float], second: Sequence[float]) -> Vector3:
-    """Small rotation from one attitude to another, in B [rad]."""
-    (a, b, c, d), (e, f, g, h) = first, second
-    w = a * e + b * f + c * g + d * h
-    x, y, z = a * f - b * e - c * h + d * g, a * g + b * h - c * e - d * f, a * h - b * g + c * f - d * e
-    sign = math.copysign(2.0, w)
-    return sign * x, sign * y, sign * z
-
-
-def _down(attitude: Sequence[float]) -> Vector3:
-    w, x, y, z = attitude
-    return 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+        self.attitude = list(turned(self._start, self._filter.state[ANGLE : ANGLE + 3].tolist()))

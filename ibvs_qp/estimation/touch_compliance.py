@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ibvs_qp.config.contact_estimation import ContactEstimationSettings
+from ibvs_qp.config.contact import ContactEstimationSettings
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.derived import stated
 from ibvs_qp.config.field_of_view import camera_rotation
+from ibvs_qp.config.settings import stated
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
 from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
 

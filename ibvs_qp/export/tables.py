@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
-from allocation.least_squares import DEFAULT_ROW_WEIGHTS
+from allocation import DEFAULT_ROW_WEIGHTS, control_effectiveness
 from ibvs_qp.config import Gains
 from ibvs_qp.export.layout import c_name
 from ibvs_qp.export.tick_code import TickCode

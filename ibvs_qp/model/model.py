@@ -10,9 +10,9 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.contact_estimation import LEAST_PUSH_DENSITY
+from ibvs_qp.config.contact import LEAST_PUSH_DENSITY
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.estimation.push_disturbance import Normal, PushDisturbance
 from ibvs_qp.frames import GRAVITY, camera_twist_matrix

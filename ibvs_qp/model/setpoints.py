@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from allocation.contact_reach import ray_reach
-from allocation.wrench_facets import WrenchFacets
+from allocation import WrenchFacets
+from allocation.reach import ray_reach
 from ibvs_qp.estimation.contact import no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import camera_twist_matrix

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.derived import Derived
-from ibvs_qp.config.settings import choice, setting, validate
+from ibvs_qp.config.settings import Derived, choice, setting, validate
 from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 
 

@@ -1,7 +1,5 @@
 """Pilot: raw sensor frames in, commands out."""
 
-from ibvs_qp.pilot.config import PilotConfig
-from ibvs_qp.pilot.pilot import Controller, LawCall, Pilot
-from ibvs_qp.pilot.status import FlightStatus
+from ibvs_qp.lazy import public_names
 
-__all__ = ["Controller", "FlightStatus", "LawCall", "Pilot", "PilotConfig"]
+__getattr__, __all__ = public_names(__name__, __file__)

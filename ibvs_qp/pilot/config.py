@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ibvs_qp.analysis.contact import require_margin
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
-from ibvs_qp.config.contact_margin import require_margin
-from ibvs_qp.config.derived import derive
 from ibvs_qp.config.errors import out_of_range
-from ibvs_qp.config.from_vehicle import contact_depth
-from ibvs_qp.config.gain_scaling import LAWS
-from ibvs_qp.config.settings import choice, dump_toml, load_toml, setting, validate
+from ibvs_qp.config.gains import LAWS
+from ibvs_qp.config.settings import choice, derive, dump_toml, load_toml, setting, validate
 from ibvs_qp.frames import to_camera
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.pattern import Pattern
@@ -89,7 +87,7 @@ class PilotConfig:
 def _guide_reach(controller: ControllerConfig, painting: PaintingConfig) -> float:
     """Distance on the wall, in contact, from the tip to where the view barrier begins on the side of the guides [m]."""
     vehicle, limits = controller.vehicle, controller.limits
-    (right, down), depth = Pattern(painting.pattern, painting.start).across, contact_depth(vehicle)
+    (right, down), depth = Pattern(painting.pattern, painting.start).across, vehicle.contact_depth_m
     x, y, _ = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
     if down:
         room = limits.view_down * depth - y if down < 0.0 else y - limits.view_up * depth

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.field_of_view import camera_rotation, field_of_view, picture_outline, straightened_intrinsics
-from ibvs_qp.config.from_vehicle import contact_depth
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
 from ibvs_qp.measurement import HORIZONTAL
@@ -72,7 +71,7 @@ def contact_picture(config: PilotConfig) -> ContactPicture:
     vehicle, vision = config.controller.vehicle, config.vision
     (width, height), rotation = vehicle.camera_size_px, camera_rotation(vehicle.camera_turn_deg)
     fx, fy, cx, cy = straightened_intrinsics(vehicle.camera_intrinsics_px, (width, height), rotation)
-    depth = max(contact_depth(vehicle), _LEAST_DEPTH_M)
+    depth = max(vehicle.contact_depth_m, _LEAST_DEPTH_M)
     x, y, _ = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
     tip = np.array((fx * x / depth + cx, fy * y / depth + cy))
     corners = picture_outline(vehicle) * (fx, fy) + (cx, cy)
@@ -116,7 +115,7 @@ def hint_span(vehicle: VehicleParams, brush_width_m: float, role: str, ahead: in
     Returns:
         Range of the normalised x of a level edge, of the normalised y of an upright one, in C.
     """
-    depth, view = max(contact_depth(vehicle), _LEAST_DEPTH_M), field_of_view(vehicle)
+    depth, view = max(vehicle.contact_depth_m, _LEAST_DEPTH_M), field_of_view(vehicle)
     x, y, _ = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)) / depth
     tip, low, high = (x, view.left, view.right) if role == HORIZONTAL else (y, view.up, view.down)
     beside = 0.5 * brush_width_m / depth + _BESIDE_BRUSH

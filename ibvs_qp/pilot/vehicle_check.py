@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from allocation import WrenchFacets, tilted_push_reach, worst_tilted_push_reach
 from allocation.actuation import SLIDING_FRICTION, Actuation, actuation
-from allocation.tilted_reach import tilted_push_reach, worst_tilted_push_reach
-from allocation.wrench_facets import WrenchFacets
-from ibvs_qp.config.from_vehicle import contact_depth, strike_yaw_deg
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.pilot.config import PilotConfig
@@ -83,7 +81,7 @@ def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = 
     trim_deg = config.controller.limits.trim_deg
     reach = sliding_reach(vehicle, found, trim_deg)
     problems = [*_reach(reach, trim_deg, push_n), *_lens(vehicle), *_tip(vehicle)]
-    if not problems or contact_depth(vehicle) > 0.0:
+    if not problems or vehicle.contact_depth_m > 0.0:
         problems += _view(config, picture)
     warnings = []
     if push_n <= reach < GOOD_REACH * push_n:
@@ -151,7 +149,7 @@ def _tip(vehicle: VehicleParams) -> list[str]:
     ):
         if tip <= place:
             found.append(f"tip behind the {name}: vehicle.tip_position_m has x = {tip:g} m, the {name} {place:g} m")
-    if not found and (strike := strike_yaw_deg(vehicle)) < _LEAST_STRIKE_DEG:
+    if not found and (strike := vehicle.strike_yaw_deg) < _LEAST_STRIKE_DEG:
         least = f"allowed is at least {_LEAST_STRIKE_DEG:g} deg"
         found.append(
             f"tip behind the propellers: one strikes the wall at a yaw of {strike:.1f} deg in contact, {least}"

@@ -1,4 +1,4 @@
-"""Shipped presets: vehicle, gains, weights and limits, tuned and flown as they are."""
+"""Shipped presets: vehicle, gains, weights and limits as tuned."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from operator import gt
 
 import numpy as np
-import osqp
 
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.problem import ProgramPatterns
@@ -43,7 +42,9 @@ class OsqpSolver:
     """
 
     def __init__(self, problem: ProgramPatterns, settings: SolverSettings) -> None:
-        self._problem, self._settings = problem, settings
+        import osqp  # slow to import: with a solver, not with the settings, and not in the first tick
+
+        self._osqp, self._problem, self._settings = osqp, problem, settings
         rows, variables = problem.a_pattern.toarray().shape
         self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
         self._no_multipliers = np.zeros(rows)
@@ -57,7 +58,7 @@ class OsqpSolver:
         settings, problem = self._settings, self._problem
         p_matrix, a_matrix = problem.p_pattern.copy(), problem.a_pattern.copy()
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
-        self._solver = osqp.OSQP()
+        self._solver = self._osqp.OSQP()
         self._solver.setup(
             p_matrix,
             q.copy(),

@@ -11,8 +11,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import osqp
-from scipy import sparse
 
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.problem import ProgramPatterns
@@ -34,6 +32,9 @@ def write_osqp(folder: Path, patterns: ProgramPatterns, settings: SolverSettings
         settings: Settings of the solver.
         single: Numbers are floats.
     """
+    import osqp
+    from scipy import sparse
+
     p, a = patterns.p_pattern.tocoo(), patterns.a_pattern.tocoo()
     solver, rows, variables = osqp.OSQP(), *a.toarray().shape
     solver.setup(  # any program of this sparsity: the first update sets all its data

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from ibvs_qp.limits.limit import Limit
 from ibvs_qp.model.inputs import clamp
@@ -18,6 +17,9 @@ from ibvs_qp.qp.row_check import check_rows
 from ibvs_qp.symbolic.bound_function import ArrayFunction
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 #: More rotors than this have directions without a wrench.
 REDUNDANT_ABOVE = 6
@@ -184,6 +186,8 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
+    from scipy import sparse  # slow to import, and no program is made before a controller
+
     column, row = sparsity.get_ccs()
     data = np.ones(sparsity.nnz())
     return sparse.csc_matrix((data, row, column), shape=sparsity.shape)

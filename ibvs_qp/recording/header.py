@@ -14,8 +14,8 @@ from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.files import parse_toml
 from ibvs_qp.config.settings import dump_toml, from_dict
-from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import Pilot, PilotConfig

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams

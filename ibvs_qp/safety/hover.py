@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
+from ibvs_qp.analysis.motion import TICKS_LATE
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.motion_margin import TICKS_LATE
 from ibvs_qp.frames import GRAVITY, down_in_body, roll_pitch
 from ibvs_qp.measurement import Measurement
 

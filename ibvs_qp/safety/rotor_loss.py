@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
-from allocation.least_squares import allocate_least_squares
+from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.contact_state import ContactState

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ibvs_qp.config.derived import Derived
-from ibvs_qp.config.settings import Checked, setting
+from ibvs_qp.config.settings import Checked, Derived, setting
 
 #: Width of the picture for which pixel settings are stated [px].
 REFERENCE_WIDTH = 640.0

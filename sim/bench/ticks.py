@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from allocation.geometry import TAROT_T960
+from allocation import TAROT_T960
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.pilot import PilotConfig

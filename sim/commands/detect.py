@@ -163,8 +163,8 @@ class Detect:
 
     def _settings(self) -> RgbdCameraSettings | None:
         """The camera of the options, or None if they state nothing of it."""
+        from ibvs_qp.config.files import read_toml
         from ibvs_qp.config.settings import from_dict
-        from ibvs_qp.config.toml_text import read_toml
         from ibvs_qp.pilot.config import CameraConfig
         from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 

@@ -13,8 +13,7 @@ from typing import Annotated, Any
 import tyro
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.config.files import UnreadableFile, open_regular
-from ibvs_qp.config.toml_text import read_toml
+from ibvs_qp.config.files import UnreadableFile, open_regular, read_toml
 from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.world.worlds import DEFAULT_WORLD
 

@@ -12,8 +12,8 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.files import parse_toml
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.controller import qp_problem
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.push_report import REDUCED, RESTORED

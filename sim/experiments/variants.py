@@ -9,8 +9,8 @@ from typing import Any
 
 import ibvs_qp
 from ibvs_qp.config import AngularRateSettings
+from ibvs_qp.config.files import read_toml
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 
 #: The gyro in full, and no lead.

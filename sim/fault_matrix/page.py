@@ -43,7 +43,7 @@ The other {borne} need not: there validation, estimation, the law or the strateg
 the supervisor is needed."""
 _ATTAINABLE = """\
 Least tilt at which the rotors carry the weight with no roll and pitch moment, by the facets of the attainable wrench
-set (`allocation/hover_tilt.py`), for the worst rotor. Where there is none up to 60 deg, no law can hold the vehicle in
+set (`allocation/hover.py`), for the worst rotor. Where there is none up to 60 deg, no law can hold the vehicle in
 the air.
 """
 _HEADS = ("fault", "place", "passed", "tilt deg", "push N", "speed m/s", "retreat s", "state", "control fails", "by")

@@ -12,8 +12,8 @@ import numpy as np
 
 from ibvs_qp.config.settings import choice, setting
 from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.quaternion import multiply
 from sim.faults.fault import FrameFilter, SensorFault
-from sim.sensors.small_turns import multiply
 
 #: What the unit delivers, with the entries of each.
 OUTPUTS = {"attitude": 4, "angular_velocity": 3, "specific_force": 3}

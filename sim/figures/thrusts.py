@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from allocation.geometry import TAROT_T960
+from allocation import TAROT_T960
 from sim.figures.style import law_panels, shade_phases, thin
 from sim.flight.trace import Trace
 

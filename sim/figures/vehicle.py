@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Polygon, Rectangle
 
-from allocation.rotor import disc_rim
+from allocation.geometry import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_vector
 from ibvs_qp.pilot import PilotConfig

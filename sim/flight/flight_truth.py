@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ibvs_qp.frames import rotation_rows
+
 
 def rotations(attitude: np.ndarray) -> np.ndarray:
     """Rotation matrices of unit quaternions (w, x, y, z): (N, 4) to (N, 3, 3)."""
-    w, x, y, z = attitude.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.moveaxis(np.array(rows), 2, 0)
+    return np.moveaxis(np.array(rotation_rows(*attitude.T)), 2, 0)
 
 
 def euler_angles(rotation: np.ndarray) -> np.ndarray:

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from allocation.level_flight import worst_level_reach
-from allocation.wrench_facets import WrenchFacets
+from allocation import WrenchFacets, worst_level_reach
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.frames import GRAVITY, rotation_from_vector

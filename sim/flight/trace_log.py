@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.config.files import UnreadableFile
+from ibvs_qp.config.files import UnreadableFile, parse_toml
 from ibvs_qp.config.settings import dump_toml, from_dict
-from ibvs_qp.config.toml_text import parse_toml
 from sim.flight.flight_log import facts_of, trace_of
 from sim.flight.trace import FIGURE_INPUTS, Trace
 from sim.storage.arrays import read_npz

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.files import UnreadableFile, read_bytes
+from ibvs_qp.config.files import UnreadableFile, parse_toml, read_bytes
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.assemble import OUTCOMES, Flown, LoggedRows, assemble

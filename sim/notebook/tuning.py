@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import ibvs_qp
-from ibvs_qp.config.contact_margin import require_margin
+from ibvs_qp.analysis.contact import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.pilot import PilotConfig

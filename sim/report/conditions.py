@@ -6,8 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.config.files import UnreadableFile
-from ibvs_qp.config.toml_text import parse_toml, read_toml
+from ibvs_qp.config.files import UnreadableFile, parse_toml, read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.report.summary_file import FACTS, read_facts
 from sim.storage.json_file import read_json

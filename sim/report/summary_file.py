@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import shown
-from ibvs_qp.config.files import UnreadableFile
-from ibvs_qp.config.toml_text import INTEGERS
+from ibvs_qp.config.files import INTEGERS, UnreadableFile
 from sim.storage.json_file import read_json
 from sim.sweep.parts import HEAD
 

@@ -9,7 +9,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
-from sim.sensors.small_turns import multiply
+from ibvs_qp.quaternion import multiply
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 
 

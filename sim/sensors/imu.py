@@ -8,10 +8,10 @@ import math
 import casadi as ca
 import numpy as np
 
+from ibvs_qp.quaternion import multiply
 from ibvs_qp.symbolic.bound_function import BoundFunction
 from sim.sensors.imu_errors import ImuErrors
 from sim.sensors.sample_clock import SampleClock
-from sim.sensors.small_turns import multiply
 from sim.world.errors import WorldErrors
 from sim.world.plant import Plant
 from sim.world.random_streams import NormalRows, stream

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sim.sensors.small_turns import multiply, small_turn
+from ibvs_qp.quaternion import multiply, small_turn
 from sim.sensors.vibration import Vibration
 from sim.world.errors import AccelerometerErrors, AttitudeErrors, GyroErrors, WorldErrors
 from sim.world.random_streams import Normals, stream

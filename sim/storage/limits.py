@@ -1,6 +1,6 @@
 """Largest files that are read, each far above what the project writes; a larger one is a wrong or a hostile file.
 
-Those of TOML are in `ibvs_qp.config.toml_text`.
+Those of TOML are in `ibvs_qp.config.files`.
 """
 
 #: A log compressed, and its arrays in memory [bytes]: 40 min of flight under both laws, at 0.9 MB/s each.

@@ -12,8 +12,8 @@ from typing import Any
 
 import ibvs_qp
 from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.files import read_toml
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
-from ibvs_qp.config.toml_text import read_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config

@@ -7,9 +7,9 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ibvs_qp.config.derived import Derived
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.gain_scaling import gain_factors
+from ibvs_qp.config.gains import gain_factors
+from ibvs_qp.config.settings import Derived
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.pilot import PilotConfig

@@ -19,8 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from allocation import Rotor, RotorGeometry
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.files import read_bytes
-from ibvs_qp.config.toml_text import LARGEST_TOML
+from ibvs_qp.config.files import LARGEST_TOML, read_bytes
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA
 from sim.world.drawn_shape import FLIP

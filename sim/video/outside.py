@@ -10,8 +10,8 @@ import cv2
 import mujoco
 import numpy as np
 
+from ibvs_qp.config.files import parse_toml
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.config.toml_text import parse_toml
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.surroundings import PAINTING_FORCE

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from allocation.rotor import perpendicular
+from allocation.geometry import perpendicular
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.world.board import BoardGeometry
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from allocation.rotor import perpendicular
+from allocation.geometry import perpendicular
 
 #: Diagonal of S; multiply a vector (..., 3) by it to change sides.
 FLIP = np.array([1.0, -1.0, -1.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from allocation.geometry import RotorGeometry
+from allocation import RotorGeometry
 from ibvs_qp.config.settings import setting, validate
 
 Vector = tuple[float, float, float]

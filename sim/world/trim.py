@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from allocation.effectiveness import control_effectiveness
-from allocation.least_squares import allocate_least_squares
+from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.world.board import BoardGeometry

@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import quaternion_from_vector
+from ibvs_qp.quaternion import from_rotation_vector
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import Vector
 from sim.world.random_streams import Normals, stream
@@ -93,4 +93,4 @@ def _direction(seed: int, purpose: str) -> np.ndarray:
 
 def turn_quaternion(degrees: Sequence[float]) -> tuple[float, float, float, float]:
     """Quaternion (w, x, y, z) of a rotation vector [deg]."""
-    return quaternion_from_vector(np.radians(degrees))
+    return from_rotation_vector(np.radians(degrees))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from ibvs_qp.config.toml_text import read_toml
+from ibvs_qp.config.files import read_toml
 from sim.world.errors import WorldErrors, world_errors, world_names
 from sim.world.scene import Scene, load_scene
 

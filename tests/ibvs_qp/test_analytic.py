@@ -1,4 +1,4 @@
-"""The paper's law, corrected: against the law written out by hand, and the details that decide whether it flies."""
+"""The paper's law, corrected: against the law written out by hand, and details that keep it stable."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ MASS = CONFIG.vehicle.mass_kg
 MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 
-def terms_of(seed: int, lines: int, share: float, config: ControllerConfig = CONFIG) -> Setpoints:
+def terms_of(seed: int, lines: int, weight: float, config: ControllerConfig = CONFIG) -> Setpoints:
     setpoints = analytic_setpoints(config)
     setpoints.update(*random_tick(np.random.default_rng(seed), lines))
-    setpoints.step.inputs["contact_weight"][0] = share
+    setpoints.step.inputs["contact_weight"][0] = weight
     evaluate_law(setpoints)
     return setpoints
 
@@ -61,14 +61,14 @@ def stacked(setpoints: Setpoints) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("lines", [0, 1, 2])
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
+@pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
+def test_the_wrench_is_the_law_by_hand(lines: int, weight: float) -> None:
     for seed in range(15):
-        setpoints = terms_of(seed, lines, share, PRINTED)
+        setpoints = terms_of(seed, lines, weight, PRINTED)
         normal = setpoints.normal
         null = np.concatenate(
             (
-                normal * (1.0 - share) * setpoints.standoff_command / MASS
+                normal * (1.0 - weight) * setpoints.standoff_command / MASS
                 + setpoints.right * setpoints.velocity_command[0]
                 + setpoints.down * setpoints.velocity_command[1],
                 setpoints.angular,
@@ -81,7 +81,7 @@ def test_the_wrench_is_the_law_by_hand(lines: int, share: float) -> None:
             acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
         servo = MASSES * acceleration
         selection = np.zeros((6, 6))
-        selection[:3, :3] = share * np.outer(normal, normal)
+        selection[:3, :3] = weight * np.outer(normal, normal)
         force = np.concatenate((normal * setpoints.push_command, np.zeros(3)))
         expected = (np.eye(6) - selection) @ servo + selection @ force
         np.testing.assert_allclose(analytic_wrench(setpoints), expected, atol=1e-8)
@@ -99,10 +99,7 @@ def test_full_contact_keeps_the_force_command() -> None:
 def test_one_angle_row_only() -> None:
     """Two lines that disagree about the roll by a degree do not pitch the vehicle; stacked as printed they would."""
     wall = Wall(attitude(), 0.0)
-    seen = (
-        wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL),
-        wall.line(-0.12, -0.02, VERTICAL),
-    )
+    seen = (wall.line(0.05, 0.5 * math.pi + 0.02, HORIZONTAL), wall.line(-0.12, -0.02, VERTICAL))
     setpoints = analytic_setpoints(PRINTED)
     setpoints.update(measured(0, plane=wall.plane, lines=seen), Reference(lines=line_references(2), contact=True))
     assert len(setpoints.lines) == 2
@@ -226,7 +223,7 @@ def test_an_unknown_allocator_is_refused() -> None:
         replace(CONFIG, allocator="best")
 
 
-def test_reset_repeats_to_the_bit_and_modes_are_named() -> None:
+def test_reset_repeats_bit_identically_and_modes_are_named() -> None:
     controller = PaperController()
     ticks = [random_tick(np.random.default_rng(tick), tick % 3, tick) for tick in range(40)]
     first = [controller.step(*tick).thrusts for tick in ticks]

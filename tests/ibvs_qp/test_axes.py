@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from references import good_reference
 from scipy.spatial.transform import Rotation
@@ -20,6 +20,7 @@ FLU_FRD = np.diag([1.0, -1.0, -1.0])
 entries = st.floats(-1.0, 1.0)
 
 
+@settings(deadline=None)
 @given(st.lists(entries, min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 0.1))
 def test_an_attitude_is_that_of_the_rotation_matrices(quaternion: list[float]) -> None:
     unit = np.array(quaternion) / np.linalg.norm(quaternion)
@@ -32,6 +33,7 @@ def test_an_attitude_is_that_of_the_rotation_matrices(quaternion: list[float]) -
     np.testing.assert_allclose(back * np.sign(back @ unit), unit, atol=1e-12)
 
 
+@settings(deadline=None)
 @given(st.lists(entries, min_size=6, max_size=6))
 def test_vectors_and_covariances_follow_the_body_axes(values: list[float]) -> None:
     force, moment = np.array(values[:3]), np.array(values[3:])

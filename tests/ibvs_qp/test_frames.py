@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -27,6 +27,7 @@ from ibvs_qp.frames import (
     skew,
     to_camera,
 )
+from ibvs_qp.quaternion import angle_between, multiply, small_difference, small_turn, turned
 
 angles = st.floats(-1.4, 1.4)
 any_angle = st.floats(-20.0, 20.0)
@@ -44,6 +45,7 @@ def test_camera_axes_are_right_down_front_of_the_body() -> None:
     np.testing.assert_allclose(to_camera(np.array([0.7, 0.01, 0.0]), np.array([0.2, 0.0, 0.08])), [0.01, -0.08, 0.5])
 
 
+@settings(deadline=None)
 @given(any_angle, angles, angles)
 def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float, roll: float) -> None:
     q = quaternion(yaw, pitch, roll)
@@ -54,6 +56,7 @@ def test_attitude_takes_body_to_world_and_w_comes_first(yaw: float, pitch: float
     np.testing.assert_allclose(rotation_from_quaternion(-q), expected, atol=1e-12)  # q and -q are one attitude
 
 
+@settings(deadline=None)
 @given(any_angle, angles, angles)
 def test_rotation_of_one_vector_is_that_of_the_matrix(yaw: float, pitch: float, roll: float) -> None:
     q, vector = quaternion(yaw, pitch, roll), (0.3, -2.0, 1.1)
@@ -80,6 +83,7 @@ def test_signs_of_roll_pitch_and_yaw_are_ned() -> None:
     assert (rotation_from_quaternion(quaternion(0.1, 0, 0)) @ [1, 0, 0])[1] > 0  # nose to the east
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
 def test_cross_and_skew_agree_with_numpy(numbers: list[float]) -> None:
     a, b = np.array(numbers[:3]), np.array(numbers[3:])
@@ -102,6 +106,7 @@ def test_camera_twist_is_the_motion_of_the_camera() -> None:
         np.testing.assert_allclose(camera_twist_matrix(camera) @ twist, [*linear, *angular], atol=1e-8)
 
 
+@settings(deadline=None)
 @given(st.floats(-1.0, 1.0), any_angle, any_angle)
 def test_aligned_line_is_the_same_line_and_agrees_with_the_reference(rho: float, theta: float, seam: float) -> None:
     for sign in (0, 1):
@@ -129,3 +134,16 @@ def test_a_rotation_vector_turns_about_its_axis() -> None:
     for vector in ([0.3, -0.2, 0.5], [0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.0, np.pi, 0.0]):
         np.testing.assert_allclose(rotation_from_vector(vector), Rotation.from_rotvec(vector).as_matrix(), atol=1e-12)
     assert np.array_equal(rotation_from_vector((0.0, 0.0, 0.0)), np.eye(3))
+
+
+@settings(deadline=None)
+@given(st.tuples(*[any_angle] * 3), st.tuples(*[st.floats(-0.02, 0.02)] * 3))
+def test_quaternions_turn_as_rotations_do(vector: tuple[float, ...], small: tuple[float, ...]) -> None:
+    first, step = Rotation.from_rotvec(vector), Rotation.from_rotvec(small)
+    q, both = first.as_quat(scalar_first=True), (first * step).as_quat(scalar_first=True)
+    for found in (multiply(q, small_turn(small)), turned(q, small)):
+        assert abs(np.dot(found, both)) == pytest.approx(1.0, abs=1e-9)
+        assert angle_between(found, both) == pytest.approx(0.0, abs=1e-5)
+    for sign in (1.0, -1.0):  # q and -q are one attitude
+        np.testing.assert_allclose(small_difference(q, sign * both), small, atol=1e-5)
+        assert angle_between(q, sign * both) == pytest.approx(np.linalg.norm(small), abs=1e-6)

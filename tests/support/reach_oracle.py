@@ -8,6 +8,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 WEIGHT, TIP = 6.0 * 9.81, np.array([0.70, 0.0, 0.0])
+IDLE, FULL = 1.2, 52.56
+LOWER, UPPER = np.full(6, IDLE), np.full(6, FULL)
 RIGHT, DOWN = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 

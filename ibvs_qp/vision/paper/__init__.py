@@ -1,8 +1,5 @@
 """The paper's vision pipeline, the named baseline beside the own perception."""
 
-from ibvs_qp.vision.paper.config import PaperConfig
-from ibvs_qp.vision.paper.perception import PaperPerception
-from ibvs_qp.vision.paper.pipeline import PaperPipeline
-from ibvs_qp.vision.paper.result import PaperDetection
+from ibvs_qp.lazy import public_names
 
-__all__ = ["PaperConfig", "PaperDetection", "PaperPerception", "PaperPipeline"]
+__getattr__, __all__ = public_names(__name__, __file__)

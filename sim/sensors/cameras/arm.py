@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from allocation.rotor import disc_rim
+from allocation.geometry import disc_rim
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_vector
 from sim.world.drawn_shape import BRUSH_LENGTH_M, brush_color

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ibvs_qp.adapters.thrust_curve import ThrustCurve
 from ibvs_qp.config.errors import ConfigError
 
 
+@settings(deadline=None)
 @given(
     quadratic=st.floats(0.0, 1.0),
     voltage=st.one_of(st.none(), st.floats(15.0, 30.0)),
-    share=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8),
+    ratio=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8),
 )
-def test_commands_give_the_thrusts(quadratic: float, voltage: float | None, share: list[float]) -> None:
+def test_commands_give_the_thrusts(quadratic: float, voltage: float | None, ratio: list[float]) -> None:
     curve = ThrustCurve(quadratic=quadratic)
-    thrusts = np.array(share) * curve.limit(voltage)
+    thrusts = np.array(ratio) * curve.limit(voltage)
     commands = curve.commands(thrusts, voltage)
     assert ((commands >= 0.0) & (commands <= 1.0 + 1e-12)).all()
     np.testing.assert_allclose(curve.thrusts(commands, voltage), thrusts, atol=1e-6)

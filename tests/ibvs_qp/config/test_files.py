@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.config.files import UnreadableFile, read_bytes
+from ibvs_qp.config.files import DEEPEST, LARGEST_TOML, UnreadableFile, parse_toml, read_bytes, read_toml
 from ibvs_qp.config.settings import from_dict, load_toml
-from ibvs_qp.config.toml_text import DEEPEST, LARGEST_TOML, parse_toml, read_toml
 from ibvs_qp.pilot import PilotConfig
 
 pytestmark = pytest.mark.timeout(60)

@@ -1,4 +1,4 @@
-"""Settings: what is refused and in which words, and the way to TOML and back."""
+"""Settings: refusals and their words, and the way to TOML and back."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ def test_defaults_pass_their_own_ranges_and_survive_toml(kind: type, tmp_path: P
 
 @settings(deadline=None)
 @given(st.floats(0.0, 200.0), st.floats(0.005, 0.5), st.booleans(), st.integers(1, 16), st.floats(0.6, 50.0))
-def test_every_value_survives_toml_to_the_bit(kp: float, speed: float, flag: bool, slots: int, mass: float) -> None:
+def test_every_value_survives_toml_bit_identically(
+    kp: float, speed: float, flag: bool, slots: int, mass: float
+) -> None:
     config = ControllerConfig(
         gains=Gains(line_kp=kp),
         contact=ContactSettings(approach_speed_m_s=speed),

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from symbolic_block import Block
 
+from ibvs_qp.analysis.contact import ContactLoop
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.contact_margin import contact_loop
 from ibvs_qp.estimation.push_disturbance import FORCE_BOUND, SLOW_BOUND, Normal, PushDisturbance
 
 CONFIG = ControllerConfig()
@@ -195,7 +195,7 @@ def test_the_mass_is_the_vehicles(mass: float) -> None:
 
 @pytest.mark.parametrize("gusts", [False, True])
 def test_the_linear_loop_of_the_margin_has_the_gain_of_this_filter(gusts: bool) -> None:
-    loop = contact_loop(CONFIG, 1500.0, DAMPING, CONFIG.brush.force_delay_s, gusts=gusts)
+    loop = ContactLoop(CONFIG, 1500.0, DAMPING, CONFIG.brush.force_delay_s, gusts=gusts)
     wall = Wall()
     wall.block.step.inputs["in_push_density"][:] = loop.push_density
     wall.block.step.inputs["in_vibration"][:] = MASS * loop.vibration

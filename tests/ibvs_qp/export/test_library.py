@@ -14,8 +14,7 @@ from c_library import COMPILERS, instance, make, needs_compiler, pair, written
 from controller_scenes import Wall, attitude, line_references, measured, random_tick
 from recorded_inputs import recording
 
-from allocation.effectiveness import control_effectiveness
-from allocation.least_squares import DEFAULT_ROW_WEIGHTS, allocate_least_squares
+from allocation import DEFAULT_ROW_WEIGHTS, allocate_least_squares, control_effectiveness
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig

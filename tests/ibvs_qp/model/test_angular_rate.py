@@ -11,10 +11,9 @@ from symbolic_block import Block
 
 import ibvs_qp
 from allocation import control_effectiveness
-from ibvs_qp.analysis.motion_loop import MotionLoop
+from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, MotionLoop, motion_sensitivity
 from ibvs_qp.config import AngularRateSettings, ConfigError, ControllerConfig, Gains
 from ibvs_qp.config.gains import LONGEST_FILTER
-from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.model.angular_rate import estimated_rate
 from ibvs_qp.model.inputs import Body
 from ibvs_qp.model.motor_thrust import motor_thrust

@@ -16,8 +16,7 @@ from scipy.optimize import lsq_linear
 from small_vehicle import SmallVehicle
 
 import ibvs_qp
-from allocation import control_effectiveness
-from allocation.geometry import TAROT_T960
+from allocation import TAROT_T960, control_effectiveness
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, Weights

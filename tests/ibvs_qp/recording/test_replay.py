@@ -180,8 +180,8 @@ def test_pilots_configurations_survive(tmp_path: Path) -> None:
     config = CASES["rotor_loss"].config()
     with Recorder(tmp_path / "a.mcap", Pilot(config)):
         pass
+    from ibvs_qp.config.files import parse_toml
     from ibvs_qp.config.settings import from_dict
-    from ibvs_qp.config.toml_text import parse_toml
     from ibvs_qp.recording.header import header
 
     assert from_dict(PilotConfig, parse_toml(header(Pilot(config))["config"], "x")) == config

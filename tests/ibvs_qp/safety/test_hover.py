@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, attitude, measured
 
-from allocation.effectiveness import control_effectiveness
-from ibvs_qp.analysis.motion_loop import MotionLoop
+from allocation import control_effectiveness
+from ibvs_qp.analysis.motion import TICKS_LATE, MotionLoop
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.motion_margin import TICKS_LATE
 from ibvs_qp.safety.hover import hold_thrusts, hover_gains
 
 CONFIG = ControllerConfig()

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from allocation.effectiveness import control_effectiveness
-from allocation.least_squares import allocate_least_squares
+from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.safety.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rotor_layouts import OCTOROTOR
 
-from allocation.effectiveness import control_effectiveness
+from allocation import control_effectiveness
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.safety.monitors.rotors import RotorMonitor

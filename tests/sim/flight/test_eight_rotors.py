@@ -15,8 +15,8 @@ from small_vehicle import SmallVehicle
 import ibvs_qp
 from allocation import control_effectiveness, push_reach
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.gains import Weights
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.config.weights import Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from sim.evaluate.metrics import compute_metrics

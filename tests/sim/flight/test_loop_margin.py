@@ -12,18 +12,17 @@ import pytest
 from closed_loop_rigs import HoldPainter, run, short_scene, wall
 
 import ibvs_qp
-from ibvs_qp.analysis.contact_loop import ContactLoop
-from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.contact_margin import (
+from ibvs_qp.analysis.contact import (
     LEAST_DAMPING_RATIO,
     STIFFNESS_RATIOS,
     BrushSettings,
-    contact_loop,
+    ContactLoop,
     contact_mode_damping,
     contact_sensitivity,
     least_margin,
     require_margin,
 )
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
 from ibvs_qp.pilot import Pilot, PilotConfig
@@ -161,7 +160,7 @@ def test_the_contact_bears_a_wrong_stiffness(law: str) -> None:
 @pytest.mark.parametrize("gain", [0.02, 0.8, 3.0])
 def test_poles_and_sensitivity_are_of_one_loop(gain: float) -> None:
     """As many poles outside the unit circle as the return difference winds around zero, the open loop being stable."""
-    loop = contact_loop(with_gains(force_kfp=gain, force_kfi=0.5), 1500.0, 30.0, 0.009)
+    loop = ContactLoop(with_gains(force_kfp=gain, force_kfi=0.5), 1500.0, 30.0, 0.009)
     growing = sum(2 if pole.imag > 1e-6 else 1 for pole in loop.poles() if pole.real > 1e-9)
     assert growing == (2 if gain > 2.0 else 0)
     assert growing or loop.sensitivity == pytest.approx(peak_by_response(loop), rel=0.02)

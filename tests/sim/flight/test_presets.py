@@ -15,8 +15,8 @@ from rotor_layouts import OCTOROTOR
 
 import ibvs_qp
 from allocation import TAROT_T960, Rotor, RotorGeometry
+from ibvs_qp.analysis.contact import BrushSettings
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.contact_margin import BrushSettings
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.painting.config import PaintingConfig

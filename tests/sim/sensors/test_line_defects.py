@@ -12,11 +12,11 @@ from defect_scenes import with_errors
 
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import LineFeature
+from ibvs_qp.quaternion import multiply, small_turn
 from sim.sensors.cameras import camera_intrinsics
 from sim.sensors.cameras.view import View
 from sim.sensors.features import SIGMA_DISTANCE_M, GeometricFeatures
 from sim.sensors.line_defects import PLANE_READINGS
-from sim.sensors.small_turns import multiply, small_turn
 from sim.world.board import BoardGeometry
 from sim.world.painted_edges import PaintedEdges
 from sim.world.scene import Scene

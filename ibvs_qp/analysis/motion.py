@@ -14,7 +14,7 @@ row, :math:`F(s) = (1 - k_u) / (1 - k_u e^{-s \Delta t})` with :math:`k_u = e^{-
                      {1 + F(s) K_d (T + 1/(s + \omega_g)) / (\tau s + 1)}, \qquad
     M_s = \max_\omega |1 + L(j\omega)|^{-1}.
 
-The loop bears any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
+The loop tolerates any factor on its gain up to M_s / (M_s - 1), and a phase of 2 arcsin(1 / (2 M_s)). T_h is the time
 from a sample to the middle of the hold of its command.
 
 The formula is finite for an unstable loop, too. The same loop in discrete time, with a command that acts one tick after
@@ -28,6 +28,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ibvs_qp.config.controller import ControllerConfig
+
+#: Gains with a larger sensitivity peak are not searched: 2.0 tolerates twice the gain and 29 degrees of phase. The same
+#: with motors of another lag than the configured one, and the ratios of that lag: 2.3 tolerates 1.8 times the gain.
+LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, LAG_RATIOS = 2.0, 2.3, (0.75, 1.3)
+#: Ticks from a sample to the middle of its command's hold: half a tick, and a tick that a sample may be old.
+TICKS_LATE = 1.5
 #: Frequencies at which the sensitivity is evaluated [rad/s]; crossover is at 5 to 20 rad/s.
 FREQUENCIES = np.geomspace(0.3, 300.0, 600)
 
@@ -103,3 +110,32 @@ class MotionLoop:
         step[6, [0, 6]] = dt, 1.0
         states = 7 if self.ki else 6  # without its gain the integral is no part of the loop
         return float(np.abs(np.linalg.eigvals(step[:states, :states])).max())
+
+
+def motion_sensitivity(config: ControllerConfig, lag_ratio: float = 1.0) -> dict[str, float]:
+    """Sensitivity peaks of "attitude", "yaw", "line", "standoff" and "landing"; see `MotionLoop`.
+
+    The rates of lines and distance come from the accelerometer and the camera; their leads from the motors' model. The
+    last centimetre of an approach, "landing", has a damping of its own. Its speed follows the distance here; at the
+    constant speed of a touch the search for the wall has a fifth of that stiffness. The analytic law has no filter of
+    the stand-off, so its margin is larger.
+
+    Args:
+        config: Gains, leads, filters, tick and motors.
+        lag_ratio: Lag of the real motors over the configured one [-].
+    """
+    gains, rate, vehicle = config.gains, config.angular_rate, config.vehicle
+    gyro, approach, landing = rate.gyro_bandwidth_hz, gains.standoff_kd, config.contact.landing_kd
+    along, no_motor_model = (gains.push_lead_s, gains.push_filter_s), math.inf
+    loops = {
+        "attitude": (gains.attitude_kp, gains.attitude_kd, 0.0, rate.lead_s, gains.attitude_filter_s, gyro),
+        "yaw": (gains.yaw_kp, gains.yaw_kd, 0.0, rate.lead_s, gains.yaw_filter_s, gyro),
+        "line": (gains.line_kp, gains.line_kd, gains.line_ki, gains.line_lead_s, gains.line_filter_s, no_motor_model),
+        "standoff": (approach * gains.standoff_kp, approach, 0.0, *along, no_motor_model),
+        "landing": (landing * gains.standoff_kp, landing, 0.0, *along, no_motor_model),
+    }
+    tick, names = config.tick_s, ("kp", "kd", "ki", "lead", "filter_s", "bandwidth_hz")
+    shared = {"lag": vehicle.motor_lag_s, "delay": TICKS_LATE * tick, "tick_s": tick, "lag_ratio": lag_ratio}
+    return {
+        loop: MotionLoop(**shared, **dict(zip(names, own, strict=True))).sensitivity_peak for loop, own in loops.items()
+    }

@@ -1,16 +1,18 @@
-"""Push reach: the published figures, a linear program as oracle, weak and dead rotors."""
+"""Push reach, level and tilted: the published figures, a linear program as oracle, weak and dead rotors."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reach_oracle import DOWN, RIGHT, TIP, WEIGHT, by_linear_program
+from reach_oracle import DOWN, FULL, IDLE, RIGHT, TIP, UPPER, WEIGHT, by_linear_program
 from rotor_layouts import OCTOROTOR
 from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 
 from allocation import (
     TAROT_T960,
@@ -19,11 +21,13 @@ from allocation import (
     hover_wrench,
     push_direction,
     push_reach,
+    tilted_push_reach,
     worst_push_reach,
+    worst_tilted_push_reach,
 )
 
-IDLE, FULL = 1.2, 52.56
 FACETS = {"six": WrenchFacets(TAROT_T960), "eight": WrenchFacets(OCTOROTOR)}
+SIX, LIMITS = FACETS["six"], (WEIGHT, TIP, IDLE, FULL)
 
 
 def towards(angle_deg: float) -> np.ndarray:
@@ -32,52 +36,48 @@ def towards(angle_deg: float) -> np.ndarray:
 
 
 def test_figures_of_the_vehicle() -> None:
-    facets = FACETS["six"]
-    assert push_reach(facets, WEIGHT, TIP, IDLE, FULL).push == pytest.approx(30.4, abs=0.05)
+    assert push_reach(SIX, *LIMITS).push == pytest.approx(30.4, abs=0.05)
     for friction, sideways, worst in ((0.3, 15.8, 14.4), (0.8, 8.7, 7.6)):
         for travel in (RIGHT, -RIGHT):
-            reach = push_reach(facets, WEIGHT, TIP, IDLE, FULL, friction=friction, travel=travel)
+            reach = push_reach(SIX, *LIMITS, friction=friction, travel=travel)
             assert reach.push == pytest.approx(sideways, abs=0.06)
         # Sliding down as well unloads the rotors further: the sideways figure is not the worst one.
-        found = worst_push_reach(facets, WEIGHT, TIP, IDLE, FULL, friction=friction)
+        found = worst_push_reach(SIX, *LIMITS, friction=friction)
         assert found.push == pytest.approx(worst, abs=0.06)
-        scan = [
-            push_reach(facets, WEIGHT, TIP, IDLE, FULL, friction=friction, travel=towards(angle)).push
-            for angle in np.arange(0.0, 360.0, 1.0)
-        ]
+        scan = [push_reach(SIX, *LIMITS, friction=friction, travel=towards(angle)).push for angle in range(360)]
         assert found.push <= min(scan) and found.push == pytest.approx(min(scan), abs=1e-3)
 
 
-@pytest.mark.parametrize(("upper", "push"), [(30.0, 28.0), (25.0, 20.5), (20.0, 13.0), (18.0, 10.0), (15.0, 5.5)])
-def test_derated_ceiling(upper: float, push: float) -> None:
-    assert push_reach(TAROT_T960, WEIGHT, TIP, IDLE, upper).push == pytest.approx(push, abs=0.06)
+def weak(rotor: str, ratio: float) -> np.ndarray:
+    upper = UPPER.copy()
+    upper[TAROT_T960.names.index(rotor)] *= ratio
+    return upper
 
 
-@pytest.mark.parametrize(("share", "push"), [(0.5, 22.4), (0.4, 14.5), (0.3, 6.7), (0.25, 2.7)])
-def test_one_weak_middle_rotor_and_what_binds(share: float, push: float) -> None:
-    upper = np.full(6, FULL)
-    upper[TAROT_T960.names.index("mid_right")] = share * FULL
+@pytest.mark.parametrize(
+    ("upper", "push"),
+    [(30.0, 28.0), (25.0, 20.5), (20.0, 13.0), (18.0, 10.0), (15.0, 5.5)]
+    + [(weak("mid_right", ratio), push) for ratio, push in ((0.5, 22.4), (0.4, 14.5), (0.3, 6.7), (0.25, 2.7))],
+)
+def test_derated_ceilings_and_what_binds(upper: Any, push: float) -> None:
     reach = push_reach(TAROT_T960, WEIGHT, TIP, IDLE, upper)
     assert reach.push == pytest.approx(push, abs=0.06)
-    assert reach.binding == ((TAROT_T960.names.index("mid_right"), "upper"),)
+    assert np.isscalar(upper) or reach.binding == ((TAROT_T960.names.index("mid_right"), "upper"),)
 
 
 def test_a_weak_outer_rotor_needs_a_push_to_hold_at_all() -> None:
-    upper = np.full(6, FULL)
-    upper[TAROT_T960.names.index("front_left")] = 0.15 * FULL
-    reach = push_reach(TAROT_T960, WEIGHT, TIP, IDLE, upper)
+    reach = push_reach(TAROT_T960, WEIGHT, TIP, IDLE, weak("front_left", 0.15))
     assert reach.least == pytest.approx(10.3, abs=0.06) and reach.push == pytest.approx(30.4, abs=0.05)
 
 
 def test_a_dead_rotor_leaves_no_push() -> None:
     for dead in range(6):
-        upper = np.full(6, FULL)
+        upper = UPPER.copy()
         upper[dead] = IDLE
         reach = push_reach(TAROT_T960, WEIGHT, TIP, IDLE, upper)
         # A lost outer rotor balances at the one push that unloads its partner as well, which is also the greatest.
-        held = by_linear_program(
-            control_effectiveness(TAROT_T960), hover_wrench(WEIGHT), push_direction(TIP), np.full(6, IDLE), upper, 1.0
-        )
+        idle = np.full(6, IDLE)
+        held = by_linear_program(SIX.matrix, hover_wrench(WEIGHT), push_direction(TIP), idle, upper, 1.0)
         assert reach.push == pytest.approx(held, abs=1e-6, nan_ok=True)
         if not math.isnan(reach.push):
             assert reach.least == pytest.approx(reach.push, abs=1e-6)
@@ -122,9 +122,9 @@ def test_equals_a_linear_program(data: st.DataObject) -> None:
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.floats(4.0, 52.56), min_size=6, max_size=6), st.floats(0.0, 1.0), st.floats(0.0, 360.0))
 def test_worst_travel_is_allowed_by_every_travel(upper: list[float], friction: float, angle: float) -> None:
-    facets, ceiling = FACETS["six"], np.array(upper)
-    worst = worst_push_reach(facets, WEIGHT, TIP, IDLE, ceiling, friction=friction)
-    one = push_reach(facets, WEIGHT, TIP, IDLE, ceiling, friction=friction, travel=towards(angle))
+    ceiling = np.array(upper)
+    worst = worst_push_reach(SIX, WEIGHT, TIP, IDLE, ceiling, friction=friction)
+    one = push_reach(SIX, WEIGHT, TIP, IDLE, ceiling, friction=friction, travel=towards(angle))
     if not math.isnan(worst.push):
         assert one.least - 1e-9 <= worst.least and worst.push <= one.push + 1e-9
 
@@ -137,8 +137,8 @@ def test_a_turned_wall_and_a_gust() -> None:
     direction = push_direction(TIP, 0.3, along + 5.0 * normal, normal)
     np.testing.assert_allclose(direction[:3], normal + 0.3 * along, atol=1e-12)
     limits = np.full(6, IDLE), np.full(6, FULL)
-    found = by_linear_program(control_effectiveness(TAROT_T960), load, direction, *limits, 1.0)
-    assert FACETS["six"].interval(load, direction, *limits)[1] == pytest.approx(found, abs=1e-6)
+    found = by_linear_program(SIX.matrix, load, direction, *limits, 1.0)
+    assert SIX.interval(load, direction, *limits)[1] == pytest.approx(found, abs=1e-6)
 
 
 def test_binding_rotors_are_at_their_limits() -> None:
@@ -162,3 +162,56 @@ def test_impossible_inputs_are_refused() -> None:
         push_reach(TAROT_T960, WEIGHT, TIP, 10.0, 5.0)
     with pytest.raises(ValueError, match="span"):
         WrenchFacets(control_effectiveness(TAROT_T960)[:, :5])
+
+
+@pytest.mark.parametrize(
+    ("friction", "travel", "tilt_deg", "push"),
+    [
+        (0.0, None, 2.0, 31.43),
+        (0.0, None, 5.0, 32.88),
+        (0.3, -RIGHT, 2.0, 19.66),
+        (0.8, -RIGHT, 2.0, 10.77),
+        (0.8, -RIGHT, 5.0, 14.17),
+    ],
+)
+def test_a_tilt_of_some_degrees_adds_newtons(friction: float, travel: Any, tilt_deg: float, push: float) -> None:
+    tilt = math.radians(tilt_deg)
+    found, angles = tilted_push_reach(SIX, *LIMITS, tilt=tilt, friction=friction, travel=travel)
+    assert found == pytest.approx(push, abs=0.06)
+    assert np.abs(angles).max() <= tilt + 1e-9
+
+
+@pytest.mark.parametrize("layout", FACETS)
+def test_without_tilt_it_is_the_reach_of_a_level_vehicle(layout: str) -> None:
+    facets = FACETS[layout]
+    for friction, travel in ((0.0, None), (0.5, RIGHT)):
+        level = push_reach(facets, *LIMITS, friction=friction, travel=travel).push
+        assert tilted_push_reach(facets, *LIMITS, tilt=0.0, friction=friction, travel=travel)[0] == pytest.approx(level)
+    worst = worst_push_reach(facets, *LIMITS, friction=0.3).push
+    assert worst <= worst_tilted_push_reach(facets, *LIMITS, tilt=0.0, friction=0.3) <= 1.02 * worst
+
+
+def test_the_rotors_hold_the_push_at_that_attitude() -> None:
+    """Gravity, push and friction in the axes of the tilted body: held up to the push found, and not beyond it.
+
+    No other attitude within the limit holds 0.1 N more.
+    """
+    limit = math.radians(2.0)
+    push, found = tilted_push_reach(SIX, *LIMITS, tilt=limit, friction=0.8, travel=-RIGHT)
+
+    def held(force: float, angles: np.ndarray) -> bool:
+        body = Rotation.from_euler("ZYX", (0.0, angles[1], angles[0])).inv()
+        direction = body.apply((1.0, 0.0, 0.0) - 0.8 * RIGHT)
+        wrench = force * np.concatenate((direction, np.cross(TIP, direction)))
+        wrench[:3] -= body.apply((0.0, 0.0, WEIGHT))
+        return SIX.contains(wrench, IDLE, FULL)
+
+    assert held(0.9999 * push, found) and not held(1.0001 * push, found)
+    grid = np.linspace(-limit, limit, 21)
+    assert not any([held(push + 0.1, np.array((roll, pitch))) for roll in grid for pitch in grid])
+
+
+def test_no_push_is_possible_without_a_hover() -> None:
+    found, angles = tilted_push_reach(SIX, WEIGHT, TIP, IDLE, 3.0, tilt=0.1)
+    assert math.isnan(found) and np.isnan(angles).all()
+    assert math.isnan(worst_tilted_push_reach(SIX, WEIGHT, TIP, IDLE, 3.0, tilt=0.1, friction=0.3))

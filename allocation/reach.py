@@ -17,14 +17,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from allocation.geometry import RotorGeometry
-from allocation.wrench_facets import ON_PLANE, WrenchFacets, crossings
+from allocation.hover import hover_wrench
+from allocation.wrench_facets import ON_PLANE, Limit, WrenchFacets, crossings
 
+Vector = tuple[float, float, float]
 #: Tip direction of a vehicle that faces its wall: body front.
-FRONT = (1.0, 0.0, 0.0)
+FRONT: Vector = (1.0, 0.0, 0.0)
 #: Travel in the wall plane below this counts as standing still; any unit.
 _STILL = 1e-12
 #: Planes that the push meets within this distance are active together [N].
 _SAME_PLANE = 1e-7
+#: Directions of travel that are tried, and steps of the linearisation [-]: the third changes less than 0.01 N.
+TRAVELS, STEPS = 48, 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,10 +47,7 @@ class PushReach:
 
 
 def push_direction(
-    tip: np.ndarray,
-    friction: float = 0.0,
-    travel: np.ndarray | None = None,
-    normal: np.ndarray | tuple[float, float, float] = FRONT,
+    tip: np.ndarray, friction: float = 0.0, travel: np.ndarray | None = None, normal: np.ndarray | Vector = FRONT
 ) -> np.ndarray:
     """Wrench that the rotors must add per newton of push, (6,).
 
@@ -67,21 +68,16 @@ def push_direction(
     return np.concatenate((force, np.cross(np.asarray(tip, float), force)))
 
 
-def hover_wrench(weight: float) -> np.ndarray:
-    """Wrench of the rotors that carries a weight [N] in level flight, (6,)."""
-    return np.array([0.0, 0.0, -weight, 0.0, 0.0, 0.0])
-
-
 def push_reach(
     rotors: RotorGeometry | WrenchFacets,
     weight: float,
     tip: np.ndarray,
-    lower: np.ndarray | float,
-    upper: np.ndarray | float,
+    lower: Limit,
+    upper: Limit,
     *,
     friction: float = 0.0,
     travel: np.ndarray | None = None,
-    normal: np.ndarray | tuple[float, float, float] = FRONT,
+    normal: np.ndarray | Vector = FRONT,
 ) -> PushReach:
     """Greatest push at the tip in level flight, exact for any number of rotors.
 
@@ -102,24 +98,15 @@ def push_reach(
     return ray_reach(facets, hover_wrench(weight), push_direction(tip, friction, travel, normal), lower, upper)
 
 
-def ray_reach(
-    facets: WrenchFacets,
-    wrench: np.ndarray,
-    direction: np.ndarray,
-    lower: np.ndarray | float,
-    upper: np.ndarray | float,
-) -> PushReach:
-    """Greatest push beside any steady wrench of the rotors.
+def ray_reach(facets: WrenchFacets, wrench: np.ndarray, direction: np.ndarray, lower: Limit, upper: Limit) -> PushReach:
+    """Greatest push beside any steady wrench of the rotors; limits and Raises as of `push_reach`.
 
     Args:
         facets: Of the rotors.
         wrench: Wrench of the rotors without push [N, N m], (6,).
         direction: Wrench per newton of push, by `push_direction`, (6,).
-        lower: Smallest thrusts [N], (n,) or one number.
-        upper: Largest thrusts [N], (n,) or one number; equal to lower for a dead rotor.
-
-    Raises:
-        ValueError: When a lower limit is above its upper limit.
+        lower: Smallest thrusts.
+        upper: Largest thrusts.
     """
     return _reach(facets, *facets.rooms(wrench, lower, upper), facets.normals @ direction)
 
@@ -128,11 +115,11 @@ def worst_push_reach(
     rotors: RotorGeometry | WrenchFacets,
     weight: float,
     tip: np.ndarray,
-    lower: np.ndarray | float,
-    upper: np.ndarray | float,
+    lower: Limit,
+    upper: Limit,
     *,
     friction: float,
-    normal: np.ndarray | tuple[float, float, float] = FRONT,
+    normal: np.ndarray | Vector = FRONT,
 ) -> PushReach:
     r"""Push that is possible in every direction of travel along the wall.
 
@@ -163,3 +150,65 @@ def _reach(facets: WrenchFacets, low: np.ndarray, high: np.ndarray, slope: np.nd
         row = np.sign(slope[plane]) * facets.coefficients[plane % len(facets.normals)]
         binding |= {(int(rotor), "upper" if row[rotor] > 0.0 else "lower") for rotor in np.flatnonzero(row)}
     return PushReach(push=max(greatest, 0.0), least=least, binding=tuple(sorted(binding)))
+
+
+def tilted_push_reach(
+    facets: WrenchFacets,
+    weight: float,
+    tip: np.ndarray,
+    lower: Limit,
+    upper: Limit,
+    *,
+    tilt: float,
+    friction: float = 0.0,
+    travel: np.ndarray | None = None,
+) -> tuple[float, np.ndarray]:
+    r"""Greatest push against a wall straight ahead while roll and pitch may deviate from level.
+
+    In level axes the rotors make the force :math:`F = f d - m g e_z` and the moment :math:`f p \times d`; in a body
+    tilted by :math:`\theta` they change by :math:`F \times \theta` and :math:`f p \times (d \times \theta)`. A linear
+    program finds f and :math:`\theta` with the f of the last step in these products. The push returned is exact at the
+    angles returned.
+
+    Args as of `push_reach`, the direction of travel in level axes, and ``tilt``, the largest roll and pitch [rad].
+
+    Returns:
+        Push [N], NaN when none is possible; and the roll and pitch that it takes [rad], (2,).
+    """
+    from scipy.optimize import linprog  # a second of import that flights do not need
+
+    tip, level = np.asarray(tip, float), hover_wrench(weight)
+    low, high = facets.rooms(level, lower, upper)
+    direction, angles = push_direction(tip, friction, travel), np.zeros(2)
+    push = ray_reach(facets, level, direction, lower, upper).push
+    for _ in range(STEPS):
+        force = (0.0 if math.isnan(push) else push) * direction[:3]
+        turned = [np.cross(force + level[:3], axis) for axis in np.eye(3)[:2]]
+        moments = [np.cross(tip, np.cross(force, axis)) for axis in np.eye(3)[:2]]
+        columns = facets.normals @ np.vstack((np.transpose(turned), np.transpose(moments)))
+        rows = np.column_stack((facets.normals @ direction, columns))
+        found = linprog(
+            (-1.0, 0.0, 0.0),
+            A_ub=np.vstack((rows, -rows)),
+            b_ub=np.concatenate((high, -low)),
+            bounds=[(0.0, None), (-tilt, tilt), (-tilt, tilt)],
+        )
+        if found.status != 0:
+            return math.nan, np.full(2, math.nan)
+        angles = found.x[1:]
+        (cr, cp), (sr, sp) = np.cos(angles), np.sin(angles)
+        body = np.array([[cp, 0.0, -sp], [sr * sp, cr, sr * cp], [cr * sp, -sr, cr * cp]])  # level axes to B
+        carried, force = np.concatenate((body @ level[:3], np.zeros(3))), body @ direction[:3]
+        push = ray_reach(facets, carried, np.concatenate((force, np.cross(tip, force))), lower, upper).push
+    return push, angles
+
+
+def worst_tilted_push_reach(
+    facets: WrenchFacets, weight: float, tip: np.ndarray, lower: Limit, upper: Limit, *, tilt: float, friction: float
+) -> float:
+    """Push that is possible in each of `TRAVELS` directions along the wall [N], or NaN; as `tilted_push_reach`."""
+    angles = 2.0 * math.pi * np.arange(TRAVELS) / TRAVELS
+    travels = np.column_stack((np.zeros(TRAVELS), np.cos(angles), np.sin(angles)))
+    limits = facets, weight, tip, lower, upper
+    pushes = [tilted_push_reach(*limits, tilt=tilt, friction=friction, travel=travel)[0] for travel in travels]
+    return float(np.min(pushes))  # NaN if one is

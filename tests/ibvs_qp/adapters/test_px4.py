@@ -1,15 +1,17 @@
-"""PX4's rotor parameters, against its formula written anew."""
+"""PX4's rotor parameters and setpoints, against its allocation written anew."""
 
 from __future__ import annotations
 
+import importlib
 import re
+import sys
 
 import numpy as np
 import pytest
 
 from allocation import TAROT_T960, RotorGeometry, control_effectiveness
 from ibvs_qp import preset
-from ibvs_qp.adapters.px4_rotors import from_px4, to_px4
+from ibvs_qp.adapters.px4 import from_px4, setpoint_scale, to_px4
 from ibvs_qp.config.errors import ConfigError
 
 OCTOROTOR = preset("octorotor_qp").controller.vehicle
@@ -29,16 +31,11 @@ def effectiveness_of_px4(text: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_the_exported_parameters_have_our_effectiveness(name: str) -> None:
+def test_exported_parameters_have_our_effectiveness_and_come_back(name: str) -> None:
     geometry, thrust_max = VEHICLES[name]
-    expected = control_effectiveness(geometry) * thrust_max
-    np.testing.assert_allclose(effectiveness_of_px4(to_px4(geometry, thrust_max)), expected, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", VEHICLES)
-def test_exported_parameters_come_back(name: str) -> None:
-    geometry, thrust_max = VEHICLES[name]
-    found = from_px4(to_px4(geometry, thrust_max))
+    text, expected = to_px4(geometry, thrust_max), control_effectiveness(geometry) * thrust_max
+    np.testing.assert_allclose(effectiveness_of_px4(text), expected, atol=1e-6)
+    found = from_px4(text)
     np.testing.assert_allclose(control_effectiveness(found.geometry), control_effectiveness(geometry), atol=1e-8)
     np.testing.assert_allclose(found.thrust_coefficients, thrust_max)
     assert found.geometry.spins.tolist() == geometry.spins.tolist()
@@ -84,3 +81,46 @@ def test_more_rotors_than_px4_has_are_refused() -> None:
     many = RotorGeometry(rotors=TAROT_T960.rotors * 3, circle_radius_m=0.5, torque_ratio_m=0.02)
     with pytest.raises(ConfigError, match="18 rotors are refused: PX4 has at most 12"):
         to_px4(many, [50.0] * 18)
+
+
+def px4_motors(geometry: RotorGeometry, coefficient: float, setpoint: np.ndarray) -> np.ndarray:
+    """Motors of a setpoint (thrust, torque) by `ControlAllocationPseudoInverse`, entry by entry.
+
+    PX4 orders axes roll, pitch, yaw, x, y, z.
+    """
+    effectiveness = coefficient * control_effectiveness(geometry)[[3, 4, 5, 0, 1, 2]]
+    mix, motors = np.linalg.pinv(effectiveness), geometry.count
+    scale = np.ones(6)
+    rolling = [sum(abs(mix[i, axis]) > 1e-3 for i in range(motors)) for axis in (0, 1)]
+    norms = [np.sqrt(sum(mix[:, axis] ** 2) / (count / 2)) for axis, count in enumerate(rolling)]
+    scale[0] = scale[1] = max(norms)
+    scale[2] = mix[:, 2].max()
+    for axis in (2, 1, 0):
+        column = [abs(mix[i, 3 + axis]) for i in range(motors)]
+        used = sum(entry > np.finfo(np.float32).eps for entry in column)
+        scale[3 + axis] = sum(column) / used if used else scale[5]
+    mix = mix / scale
+    mix[abs(mix) < 1e-3] = 0.0
+    return mix @ setpoint[[3, 4, 5, 0, 1, 2]]
+
+
+@pytest.mark.parametrize("geometry", [TAROT_T960, OCTOROTOR.geometry])
+@pytest.mark.parametrize("coefficient", [52.56, 6.5])  # CT: PX4 needs only the ratios
+def test_px4_commands_the_thrusts_of_the_wrench(geometry: RotorGeometry, coefficient: float) -> None:
+    matrix = control_effectiveness(geometry)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        wrench = np.array([0.0, 0.0, -58.86, 0.0, 0.0, 0.0]) + rng.normal(0.0, [5, 5, 10, 1, 1, 0.5])
+        motors = px4_motors(geometry, coefficient, setpoint_scale(geometry, 52.56) * wrench)
+        np.testing.assert_allclose(matrix @ (52.56 * motors), wrench, atol=2e-2)
+
+
+def test_hover_is_thrust_upwards_alone() -> None:
+    setpoint = setpoint_scale(TAROT_T960, 52.56) * [0.0, 0.0, -58.86, 0.0, 0.0, 0.0]
+    assert setpoint[2] == pytest.approx(-58.86 / (6 * 52.56 * np.cos(np.radians(30.0))), rel=1e-9)
+
+
+def test_the_former_name_of_the_module_works_with_a_warning() -> None:
+    sys.modules.pop("ibvs_qp.adapters.px4_rotors", None)
+    with pytest.warns(DeprecationWarning, match=r"px4_rotors is ibvs_qp\.adapters\.px4 now"):
+        assert importlib.import_module("ibvs_qp.adapters.px4_rotors").from_px4 is from_px4
