@@ -74,15 +74,16 @@ class SurfaceColors:
         """
         if self._given is not None or self.light is not None:
             return
-        samples, gate = colors[component].astype(np.float32), np.float32(self._gate**2)
+        samples, gate = _taken(colors, np.flatnonzero(component)), np.float32(self._gate**2)
         samples = samples[squared_distance(samples, self.paint) > gate]
         if self.board is not None:
             like = samples[squared_distance(samples, self.board) < gate]
             samples = like if len(like) > len(samples) // 4 else samples[:0]
         if (count := len(samples)) < _LEAST_BOARD:
             return
-        few = np.sort(samples[:: max(count // _SAMPLES, 1)], axis=0)
-        median = few[len(few) // 2].copy()
+        few = samples[:: max(count // _SAMPLES, 1)].T.copy()
+        few.sort()
+        median = few[:, few.shape[1] // 2].copy()
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
     def learn_light(

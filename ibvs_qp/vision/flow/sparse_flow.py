@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.compilation import kernel
+from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
 from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
@@ -195,32 +196,47 @@ def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -
     Information is the structure tensor over the window, noise removed, per noise variance, with a floor on the
     error that structure cannot lower: along a lone edge it vanishes (aperture).
     """
-    gx, gy = (cv2.Sobel(grey, cv2.CV_16S, 1 - k, k) for k in (0, 1))
-    (xx, xy, yy), noise = _products(gx, gy, points, config.window_px // 2) / _SOBEL, config.grey_sigma**2
-    middle, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    values = np.stack((middle + half, middle - half))
-    known = np.maximum(0.0, values - 2.0 * config.window_px**2 * (_SOBEL_NOISE / _SOBEL) * noise) / noise
-    high, low = np.sqrt(known / (1.0 + known * config.pixel_sigma**2))
-    slope = np.divide(high - low, 2.0 * half, out=np.zeros(len(half)), where=half > 0.0)
-    level = 0.5 * (high + low)
-    along, across, both = level + slope * (xx - middle), level + slope * (yy - middle), slope * xy
-    return np.stack((along, both, both, across), axis=1).reshape(-1, 2, 2)
+    noise = config.grey_sigma**2
+    floor = 2.0 * config.window_px**2 * (_SOBEL_NOISE / _SOBEL) * noise
+    return _information_roots(grey, points, config.window_px // 2, floor, noise, config.pixel_sigma**2)
 
 
-@kernel("f8[:, ::1](i2[:, ::1], i2[:, ::1], f4[:, ::1], i8)")
-def _products(gx: np.ndarray, gy: np.ndarray, points: np.ndarray, reach: int) -> np.ndarray:
-    """Sums of gx gx, gx gy and gy gy over windows around points (n, 2), (3, n); the border is continued."""
-    (height, width), sums = gx.shape, np.zeros((3, len(points)))
+@kernel("f8[:, :, ::1](u1[:, ::1], f4[:, ::1], i8, f8, f8, f8)")
+def _information_roots(
+    grey: np.ndarray, points: np.ndarray, reach: int, floor: float, noise: float, error: float
+) -> np.ndarray:
+    """The same for windows of a half width; `error` is the variance that structure cannot lower [px2]."""
+    (height, width), roots = grey.shape, np.empty((len(points), 2, 2))
     for i in range(len(points)):
         u, v = np.int64(np.rint(points[i, 0])), np.int64(np.rint(points[i, 1]))
-        for row in range(v - reach, v + reach + 1):
-            for column in range(u - reach, u + reach + 1):
-                r, c = min(max(row, 0), height - 1), min(max(column, 0), width - 1)
-                x, y = np.float64(gx[r, c]), np.float64(gy[r, c])
-                sums[0, i] += x * x
-                sums[1, i] += x * y
-                sums[2, i] += y * y
-    return sums
+        sum_xx, sum_xy, sum_yy = 0, 0, 0
+        for dv in range(-reach, reach + 1):
+            row = min(max(v + dv, 0), height - 1)
+            above, at, below = grey[_mirrored(row - 1, height)], grey[row], grey[_mirrored(row + 1, height)]
+            for du in range(-reach, reach + 1):
+                c = min(max(u + du, 0), width - 1)
+                l, r = _mirrored(c - 1, width), _mirrored(c + 1, width)  # noqa: E741
+                x = np.int64(above[r]) + 2 * np.int64(at[r]) + np.int64(below[r])
+                x -= np.int64(above[l]) + 2 * np.int64(at[l]) + np.int64(below[l])
+                y = np.int64(below[l]) + 2 * np.int64(below[c]) + np.int64(below[r])
+                y -= np.int64(above[l]) + 2 * np.int64(above[c]) + np.int64(above[r])
+                sum_xx, sum_xy, sum_yy = sum_xx + x * x, sum_xy + x * y, sum_yy + y * y
+        xx, xy, yy = sum_xx / _SOBEL, sum_xy / _SOBEL, sum_yy / _SOBEL
+        middle, half = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        high, low = max(0.0, middle + half - floor) / noise, max(0.0, middle - half - floor) / noise
+        high, low = math.sqrt(high / (1.0 + high * error)), math.sqrt(low / (1.0 + low * error))
+        slope, level = (high - low) / (2.0 * half) if half > 0.0 else 0.0, 0.5 * (high + low)
+        roots[i, 0, 0], roots[i, 1, 1] = level + slope * (xx - middle), level + slope * (yy - middle)
+        roots[i, 0, 1] = roots[i, 1, 0] = slope * xy
+    return roots
+
+
+@inner
+def _mirrored(i: int, n: int) -> int:
+    """Index within a row of n, mirrored at its ends without repeating them."""
+    if i < 0:
+        return -i
+    return i if i < n else 2 * n - 2 - i
 
 
 def inverse_depths(

@@ -118,8 +118,8 @@ def places_beside(
     A margin, fraction of the length, is left out at either end.
     """
     share = margin + (1.0 - 2.0 * margin) * np.arange(count) / (count - 1)
-    start, run = segments[:, None, None, :2], (segments[:, 2:] - segments[:, :2])[:, None, None]
-    u, v = np.moveaxis(start + share[:, None] * run + aside[:, :, None], -1, 0)
+    first, last = segments[:, :2, None, None], segments[:, 2:, None, None]
+    u, v = (first[:, k] + share * (last[:, k] - first[:, k]) + aside[:, :, k, None] for k in range(2))
     return u, v
 
 

@@ -237,7 +237,8 @@ def _differing(segments: np.ndarray, colors: SurfaceColors, picture: Picture) ->
     """Fraction of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
     height, width = picture.mask.shape
     u, v = places_beside(segments, _aside(segments, _BESIDE_PX * picture.scale), _PLACES)
-    u, v = np.rint(u).astype(np.intp).clip(0, width - 1), np.rint(v).astype(np.intp).clip(0, height - 1)
+    u = np.minimum(np.maximum(np.rint(u), 0.0), width - 1.0).astype(np.intp)
+    v = np.minimum(np.maximum(np.rint(v), 0.0), height - 1.0).astype(np.intp)
     labels = colors.label(picture.rgb[v, u], u, v)
     one, two = labels[:, 0], labels[:, 1]
     return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)

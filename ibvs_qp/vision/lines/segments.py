@@ -169,9 +169,9 @@ def find_segments(
     middle = 0.5 * (small.shape[1] - 1), 0.5 * (small.shape[0] - 1)
     reach, least = int(math.hypot(*middle)) + 2, int(_VOTED * shortest)
     points = _edge_points(small, mask, factor, region, rows, columns)
-    degrees = np.rint(np.degrees(np.arctan2(points[:, 3], points[:, 2]))).astype(np.int64) % _ANGLES
-    order = np.argsort(degrees, kind="stable")
-    points, first = points[order], np.searchsorted(degrees[order], np.arange(_ANGLES + 1))
+    degrees = np.rint(np.degrees(np.arctan2(points[:, 3], points[:, 2]))).astype(np.int16) % _ANGLES
+    points = points.take(np.argsort(degrees, kind="stable"), axis=0)
+    first = np.concatenate(([0], np.cumsum(np.bincount(degrees, minlength=_ANGLES))))
     points[:, :2] -= middle
     votes = _votes(points, first, normals, _NORMALS, reach)
     degree, distance = _peaks(votes, max(least, 1))

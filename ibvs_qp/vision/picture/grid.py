@@ -68,14 +68,17 @@ class CoarseGrid:
 
     def inverse_depth(self, depth: np.ndarray, config: PlaneConfig) -> np.ndarray:
         """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
-        return _inverse(np.asarray(self.sample(depth), np.float32), config)
+        z = np.asarray(self.sample(depth), np.float32).astype(float)
+        usable = (z > config.distance_min_m) & (z < config.distance_max_m)
+        return np.divide(1.0, z, out=np.zeros(z.shape), where=usable)
 
     def mean_inverse_depth(self, depth: np.ndarray, config: PlaneConfig) -> np.ndarray:
         """1/Z of the mean depth of the four pixels around the upper left corner of each sample, else as above.
 
         A pixel without a reading pulls the mean far off the surface.
         """
-        return _inverse(_corner_means(np.require(depth, np.float32, ("C", "W")), self._places), config)
+        depth = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
+        return _mean_inverse(depth, self._places, float(config.distance_min_m), float(config.distance_max_m))
 
     def cells_at(self, u: ArrayLike, v: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows and columns of the samples nearest to pixels, the border's beyond the grid, and which pixels are not."""
@@ -108,20 +111,16 @@ class Samples:
     inverse: np.ndarray  # 1/Z [1/m], 0 where absent or out of range, (rows, columns)
 
 
-@kernel("f4[:, ::1](f4[:, ::1], i2[:, :, ::1])")
-def _corner_means(depth: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Mean depth of the four pixels around the upper left corners of places, (rows, columns, 2)."""
+@kernel("f8[:, ::1](f4[:, ::1], i2[:, :, ::1], f8, f8)")
+def _mean_inverse(depth: np.ndarray, places: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
+    """1/Z of the mean depth around the upper left corners of places (rows, columns, 2), 0 where out of range."""
     (rows, columns, _), quarter = places.shape, np.float32(0.25)
-    means = np.empty((rows, columns), np.float32)
+    inverse = np.empty((rows, columns))
     for i in range(rows):
         for j in range(columns):
             right, below = np.int64(places[i, j, 0]), np.int64(places[i, j, 1])
             left, above = max(right - 1, 0), max(below - 1, 0)
-            upper = quarter * depth[above, left] + quarter * depth[above, right]
-            means[i, j] = upper + quarter * depth[below, left] + quarter * depth[below, right]
-    return means
-
-
-def _inverse(depth: np.ndarray, config: PlaneConfig) -> np.ndarray:
-    z = depth.astype(float)
-    return np.divide(1.0, z, out=np.zeros(z.shape), where=(z > config.distance_min_m) & (z < config.distance_max_m))
+            mean = quarter * depth[above, left] + quarter * depth[above, right]
+            z = np.float64(mean + quarter * depth[below, left] + quarter * depth[below, right])
+            inverse[i, j] = 1.0 / z if nearest < z < farthest else 0.0
+    return inverse

@@ -125,7 +125,10 @@ def refit_plane(
         wanted = config.fine_gate_sigmas * (spread if sigma is None else sigma)
         gate = min(max(wanted, config.fine_gate_low), config.fine_gate_high)
     length = math.hypot(*plane.tolist())
-    if not upright(plane, down, config):
+    upright = float(plane[2]) > math.cos(math.radians(config.max_oblique_deg)) * length
+    if down is not None:
+        upright &= abs(float(plane @ down)) < math.sin(math.radians(config.max_lean_deg)) * length
+    if not upright:
         return "the surface does not stand upright or does not face the camera"
     if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
         return f"the surface lies {1.0 / length:.2f} m away, out of range"
@@ -143,15 +146,6 @@ def refit_plane(
         residual_sigma=spread,
         component=component,
     )
-
-
-def upright(planes: np.ndarray, down: np.ndarray | None, config: PlaneConfig) -> np.ndarray:
-    """Whether planes (..., 3) face the camera and, if gravity's direction in C (3,) is known, stand upright, (...)."""
-    length = np.sqrt(np.vecdot(planes, planes))
-    good = planes[..., 2] > math.cos(math.radians(config.max_oblique_deg)) * length
-    if down is not None:
-        good = good & (np.abs(planes @ down) < math.sin(math.radians(config.max_lean_deg)) * length)
-    return good
 
 
 def connected_samples(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:

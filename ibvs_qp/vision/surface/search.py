@@ -12,7 +12,7 @@ from ibvs_qp.vision.compilation import kernel
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
 from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.plane import PlaneEstimate, refit_plane, upright
+from ibvs_qp.vision.surface.plane import PlaneEstimate, refit_plane
 from ibvs_qp.vision.surface.seeds import seed_values
 
 #: Samples by which planes are scored; more cost time and change nothing.
@@ -145,7 +145,11 @@ class PlaneSearch:
         planes, score = score_planes(
             design, flat, place, value, pairs, judges, _VOTE * config.coarse_gate, _NEAR, _SPAN
         )
-        score = score * upright(planes, down, config)
+        length = np.linalg.norm(planes, axis=1)
+        upright = planes[:, 2] > math.cos(math.radians(config.max_oblique_deg)) * length
+        if down is not None:
+            upright &= np.abs(planes @ down) < math.sin(math.radians(config.max_lean_deg)) * length
+        score = score * upright
         best = int(np.argmax(score))
         return planes[best] if score[best] > 0 else None
 
