@@ -26,8 +26,7 @@ ORDER = {
 }
 #: Rooms of vision in the order of its stages: data passes forward.
 STAGES = (
-    "robust config kernels checks picture appearance surface flow lines perception_result overlay "
-    "make_result paper perception"
+    "compilation medians config checks picture appearance surface flow lines perception_result overlay paper perception"
 ).split()
 #: What every package must not import.
 FORBIDDEN = {

@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from ibvs_qp.vision.perception_result import PerceptionResult
     from ibvs_qp.vision.surface.plane import PlaneEstimate
 
+_HOMES = {
+    "ibvs_qp.vision.config": ("VisionConfig",),
+    "ibvs_qp.model.interaction_matrix": ("endpoint_line_row", "line_interaction_matrix"),
+    "ibvs_qp.vision.lines.line_state": ("LineHint", "TrackState"),
+    "ibvs_qp.vision.perception_result": ("PerceptionResult",),
+    "ibvs_qp.vision.perception": ("Perception",),
+    "ibvs_qp.vision.surface.plane": ("PlaneEstimate",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "LineHint",
     "Perception",
@@ -26,22 +35,6 @@ __all__ = [
     "endpoint_line_row",
     "line_interaction_matrix",
 ]
-
-_HOMES = {
-    "ibvs_qp.vision.config": ("VisionConfig",),
-    "ibvs_qp.model.interaction_matrix": (
-        "endpoint_line_row",
-        "line_interaction_matrix",
-    ),
-    "ibvs_qp.vision.lines.line_state": (
-        "LineHint",
-        "TrackState",
-    ),
-    "ibvs_qp.vision.perception_result": ("PerceptionResult",),
-    "ibvs_qp.vision.perception": ("Perception",),
-    "ibvs_qp.vision.surface.plane": ("PlaneEstimate",),
-}
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:

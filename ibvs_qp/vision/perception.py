@@ -13,28 +13,26 @@ from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
+from ibvs_qp.vision.compilation import prepare
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.flow.camera_motion import CameraMotion
-from ibvs_qp.vision.flow.ego_motion import surface_motion
+from ibvs_qp.vision.flow.motion import CameraMotion, surface_motion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
-from ibvs_qp.vision.kernels import prepare
 from ibvs_qp.vision.lines.candidates import Candidate, find_candidates
-from ibvs_qp.vision.lines.edge_segments import half_resolution
 from ibvs_qp.vision.lines.guides import GuideKeeper
 from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.lines.segments import half_resolution
 from ibvs_qp.vision.lines.tracks import LineTracker
-from ibvs_qp.vision.make_result import make_result
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception_result import PerceptionResult, make_result
 from ibvs_qp.vision.picture.exposure import ExposureSteps
 from ibvs_qp.vision.picture.picture import Picture
 from ibvs_qp.vision.surface.layout import PictureLayout
 from ibvs_qp.vision.surface.seeds import UP_LEFT
-from ibvs_qp.vision.surface.surface_tracker import SurfaceTracker
+from ibvs_qp.vision.surface.tracker import SurfaceTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
-#: Half width of the search strips where points of the surface tell the camera's motion [px at 640].
-_SEEN_STRIP_PX = 8.0
+#: Half width of the search strips where points of the surface give the camera's motion [px at 640].
+_SURFACE_STRIP_PX = 8.0
 
 
 class Perception:
@@ -57,14 +55,14 @@ class Perception:
         self._camera_position = np.zeros(3) if vehicle is None else np.asarray(vehicle.camera_position_m, float)
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
         self._surface = SurfaceTracker(config.plane, self._colors)
-        self._tracker, self._flow = LineTracker(config), SparseFlow(config.flow)
+        self._tracker, self._flow = LineTracker(config), SparseFlow(config.flow, self._camera_position)
         self._layout: PictureLayout | None = None
         self._exposure, self._guides = ExposureSteps(), GuideKeeper()
         self._gate = PictureGate(in_flight=vehicle is not None)
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything seen: the same pictures then give the same bits."""
+        """Start again as new: the same pictures then give the same bits."""
         parts = (self._gate, self._surface, self._tracker, self._flow, self._colors, self._exposure, self._guides)
         for part in parts:
             part.reset()
@@ -84,12 +82,12 @@ class Perception:
         detect: bool = False,
         seed_pixel: tuple[float, float] | None = None,
     ) -> PerceptionResult:
-        """See one picture; never raises, a picture that cannot be used is refused with a reason.
+        """Process one picture; never raises, a picture that cannot be used is refused with a reason.
 
         Args:
             frame: Colour and depth with intrinsics and capture time.
             attitude: Quaternion B in I at capture, (4,), or None for an upright camera of unknown attitude.
-            rotation: Turn of the body since the picture before, in B [rad], (3,), or None if no gyro tells it.
+            rotation: Turn of the body since the picture before, in B [rad], (3,), or None without a gyro.
             velocity: Velocity of the centre of mass in B [m/s] for the prediction, (3,), or None.
             hints: Lines the caller expects.
             detect: Search for new lines in this picture in any case.
@@ -134,7 +132,7 @@ class Perception:
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
         self._stamp_ns = frame.stamp_ns
 
-        motion, turn, seen = self._motion(frame, rotation, velocity, interval)
+        motion = self._motion(frame, rotation, velocity, interval)
         before = None if self._surface.plane is None else self._surface.plane.inverse_depth
         predicted = None if before is None else motion.plane(before)
         refused = self._surface.update(frame, layout, predicted, down, seed_pixel)
@@ -143,7 +141,7 @@ class Perception:
 
         inverse_depth = None if plane is None else plane.inverse_depth
         picture = Picture.of(frame.rgb, layout.mask, frame.intrinsics, frame.depth, inverse_depth)
-        strip = _SEEN_STRIP_PX if seen else self._config.line.strip_px
+        strip = _SURFACE_STRIP_PX if motion.by_surface else self._config.line.strip_px
         self._tracker.advance(picture, motion, before, interval, self._colors, tilt or 0.0, strip)
         self._tracker.hints(hints, picture, self._colors, tilt or 0.0)
         clock.lap("tracks")
@@ -151,31 +149,12 @@ class Perception:
         candidates = self._detect(picture, frame, layout, down, tilt, detect)
         clock.lap("detect")
 
-        flow = self._flow.update(
-            frame.rgb,
-            frame.depth,
-            layout.excluded,
-            frame.intrinsics,
-            frame.stamp_ns,
-            turn,
-            motion.rotation,
-            plane,
-            self._camera_position,
-            busy=self._since_detection == 0,
-        )
+        flow = self._flow.update(frame, layout.excluded, motion, plane, busy=self._since_detection == 0)
         clock.lap("flow")
 
+        tracks, least, times = self._tracker.tracks, self._config.track.confidence_min, clock.times
         return make_result(
-            frame,
-            self._tracker.tracks,
-            plane,
-            flow,
-            tuple(candidates),
-            refused,
-            layout.mask,
-            clock.times,
-            self._guides,
-            self._config.track.confidence_min,
+            frame, tracks, plane, flow, tuple(candidates), refused, layout.mask, times, self._guides, least
         )
 
     def _plain(self, frame: RgbdFrame) -> RgbdFrame:
@@ -200,20 +179,19 @@ class Perception:
 
     def _motion(
         self, frame: RgbdFrame, rotation: np.ndarray | None, velocity: np.ndarray | None, interval: float
-    ) -> tuple[CameraMotion, np.ndarray, bool]:
-        """Motion of the camera, turn of the body, and whether the surface's points tell them instead of the gyro."""
+    ) -> CameraMotion:
+        """Motion of the camera since the picture before: without a gyro by the surface's points, else as if still."""
         if rotation is not None:
             self._grey = None
-            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position), rotation, False
+            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position)
         small, factor = half_resolution(frame.rgb)
         before, self._grey = self._grey, cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
         plane, region = self._surface.plane, self._surface.region
         if before is not None and plane is not None and region is not None:
-            region = dataclasses.replace(region, plane=plane)
-            seen = surface_motion(before, self._grey, factor, region, frame.intrinsics)
-            if seen is not None:
-                return seen, cv2.Rodrigues(R_BODY_CAMERA @ seen.rotation @ R_BODY_CAMERA.T)[0].ravel(), True
-        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position), np.zeros(3), False
+            motion = surface_motion(before, self._grey, factor, region.cells, plane, frame.intrinsics)
+            if motion is not None:
+                return motion
+        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position)
 
     def _detect(
         self,
@@ -224,7 +202,7 @@ class Perception:
         tilt: float | None,
         wanted: bool,
     ) -> list[Candidate]:
-        """Search for lines when it is time to, or when asked."""
+        """Search for lines when it is time to, or when wanted."""
         self._since_detection += 1
         self._frames += 1
         settings = self._config.detect
@@ -235,8 +213,8 @@ class Perception:
             return []
         self._since_detection = 0
         surface = self._surface.region_now(frame, layout, down)
-        self._tracker.judge(picture, frame.depth, surface, self._colors, tilt)
+        self._tracker.rescore(picture, surface, self._colors, tilt)
         followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        candidates = find_candidates(picture, frame.depth, surface, self._colors, self._config, tilt, followed)
+        candidates = find_candidates(picture, surface, self._colors, self._config, tilt, followed)
         self._tracker.offer(candidates, picture)
         return candidates

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ibvs_qp.vision.surface.estimate import PlaneEstimate
+from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: The four guides, by the side of the surface on which they lie.
 GUIDE_SIDES = ("top", "bottom", "left", "right")

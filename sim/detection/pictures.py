@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture.convert import to_color
+from ibvs_qp.vision.picture.camera import to_color
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.storage.arrays import read_npy, read_npz
 from sim.storage.limits import LARGEST_PICTURE, LONGEST_SIDE

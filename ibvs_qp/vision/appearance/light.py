@@ -1,4 +1,4 @@
-"""Uneven light: how much brighter the surface is here than there, so that a colour is judged by what lights it."""
+"""Uneven light: how much brighter the surface is here than there, so that a colour is compared in its own light."""
 
 from __future__ import annotations
 
@@ -7,22 +7,34 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.light_samples import LEAST, LEFT_OUT, distances, is_even, left_by_two_materials
-from ibvs_qp.vision.kernels.colors import SURE, UNEVEN, light_of
-from ibvs_qp.vision.kernels.labels import CELL_BITS, UNKNOWN
+from ibvs_qp.vision.appearance.labels import CELL_BITS, LIGHT_STEP, squared_distance
+from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.mask import Intrinsics
 
-#: Step between two levels of light [ln]: half of it is a seventh of the gate of a white board.
-STEP = 0.03
+#: Light of samples in which board or paint could be at all, times that in which their colour is known.
+DIMMEST, BRIGHTEST = np.float32(0.4), np.float32(2.5)
+#: Fraction of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
+_SURE = 0.75
+#: Light that differs by less than this over the surface is even [ln]: the gate holds +-0.1 on a white board.
+_UNEVEN = 0.10
+#: Distance from the board's tint, fraction of the gate in that light: a mixed edge is farther.
+_BOARD_TINT = 0.7
+#: A channel this high is cut off, it shows neither light nor tint; and the highest there is [grey levels].
+_CUT, _WHITE = 250, np.float32(255.0)
+#: Light is uneven only where one level leaves out this fraction of what has the surface's tint.
+_LEFT_OUT = 0.02
+#: Least samples of the light.
+_LEAST = 40
 #: Light is held between these levels [steps]: 0.4 to 2.5 times the light of the reference.
 _LEVELS = 30
 #: A field that is already known is kept down to this difference of light, less than what makes a new one [ln].
 _KEPT = 0.07
 #: Rounds in which the field grows from where it is known: each reaches as far again as the gate allows.
 _ROUNDS, _ROUNDS_KNOWN = 8, 2
-#: Pull of the field's coefficients to zero, as variances of its terms: a band of the surface tells a slope, only much
+#: Pull of the field's coefficients to zero, as variances of its terms: a band of the surface shows a slope, only much
 #: of it a curvature.
 _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
-#: What a field may leave of what two materials in even light leave, see `left_by_two_materials`. Light on a board
+#: What a field may leave of what two materials in even light leave, see `_left_by_two_materials`. Light on a board
 #: leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board beside a grey
 #: wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board 0.7 at least.
 #: Taken for light a step costs the edge.
@@ -33,21 +45,13 @@ _BEYOND = 0.06
 
 @dataclass(frozen=True)
 class LightField:
-    """Light over the picture, relative to a reference: exp of a quadratic polynomial of the place.
+    """Light over the picture, relative to a reference: exp of a quadratic polynomial of the place."""
 
-    Attributes:
-        terms: Coefficients of 1, x, y, x^2, x y, y^2 of normalised places over `reach`, (6,).
-        range: Least and greatest logarithm of the light, by what was seen.
-        reach: Largest normalised coordinate of the picture.
-        shape: (height, width) of the picture [px].
-        intrinsics: (fx, fy, cx, cy) [px].
-    """
-
-    terms: np.ndarray
-    range: tuple[float, float]
-    reach: float
-    shape: tuple[int, int]
-    intrinsics: tuple[float, float, float, float]
+    terms: np.ndarray  # coefficients of 1, x, y, x^2, x y, y^2 of normalised places over `reach`, (6,)
+    range: tuple[float, float]  # least and greatest logarithm of the light, by what was seen
+    reach: float  # largest normalised coordinate of the picture
+    shape: tuple[int, int]  # (height, width) of the picture [px]
+    intrinsics: Intrinsics  # (fx, fy, cx, cy) [px]
 
     @cached_property
     def levels(self) -> np.ndarray:
@@ -67,12 +71,12 @@ class LightField:
         side = 1 << CELL_BITS
         u, v = (np.arange(0, size, side) + 0.5 * (side - 1) for size in (width, height))
         x, y = np.meshgrid((u - cx) / fx, (v - cy) / fy)
-        return np.rint(self.at(np.stack((x, y), axis=-1)) / STEP).astype(int)
+        return np.rint(self.at(np.stack((x, y), axis=-1)) / LIGHT_STEP).astype(int)
 
     def at(self, places: np.ndarray) -> np.ndarray:
         """Logarithm of the light at normalised places (..., 2)."""
         light = products(places / self.reach) @ self.terms
-        return np.clip(light, max(self.range[0], -_LEVELS * STEP), min(self.range[1], _LEVELS * STEP))
+        return np.clip(light, max(self.range[0], -_LEVELS * LIGHT_STEP), min(self.range[1], _LEVELS * LIGHT_STEP))
 
     def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Level of light at pixels, uint8 of their shape."""
@@ -93,10 +97,10 @@ def fit_light(
     board: np.ndarray,
     gate: float,
     shape: tuple[int, int],
-    intrinsics: tuple[float, float, float, float],
+    intrinsics: Intrinsics,
     before: LightField | None = None,
     *,
-    paint: np.ndarray = UNKNOWN,
+    paint: np.ndarray | None = None,
     anchored: bool = False,
 ) -> tuple[LightField, np.ndarray] | None:
     """How the light falls on the surface, grown from where the surface's colour is known.
@@ -112,47 +116,108 @@ def fit_light(
         shape: (height, width) of the picture [px].
         intrinsics: Of the picture [px].
         before: The field of the pictures before, or None for even light.
-        paint: Colour of the paint, which is left out, RGB float32 (3,), empty if unknown.
+        paint: Colour of the paint, which is left out, RGB float32 (3,), None if unknown.
         anchored: Whether the surface's colour is known, so that its light in the middle of the picture is sought too.
 
     Returns:
-        The field and the surface's colour in its reference light; None where the light is even, or cannot be told.
+        The field and the surface's colour in its reference light; None where the light is even, or unknown.
     """
     colors, board = colors.astype(np.float32), board.astype(np.float32)
     light, cut, tinted, even = light_of(colors, board, paint, gate)
     held, count = int(np.count_nonzero(even)), int(np.count_nonzero(tinted))
-    if count < LEAST or (before is None and is_even(held, count)):
+    if count < _LEAST or (before is None and held >= (1.0 - _LEFT_OUT) * count):
         return None
     colors, light, places, cut = colors[tinted], light[tinted], places[tinted], cut[tinted]
     fx, fy, cx, cy = intrinsics
     reach = max(cx / fx, (shape[1] - 1 - cx) / fx, cy / fy, (shape[0] - 1 - cy) / fy)
     design, logarithm = products(places / reach), np.log(light)
     expected = np.zeros(count) if before is None else before.at(places)
-    near, telling, solution = np.zeros(0, bool), np.zeros(0, bool), np.zeros(6)
+    near, counted, solution = np.zeros(0, bool), np.zeros(0, bool), np.zeros(6)
     for _ in range(_ROUNDS if before is None else _ROUNDS_KNOWN):
         gain = np.exp(expected).astype(np.float32)
-        near = distances(colors, board, gain) < (gate * gain) ** 2
-        # what is cut off is at least as bright as it looks: it tells something only where less was expected
-        telling, told = near & (~cut | (expected < logarithm)), telling
-        if int(np.count_nonzero(telling)) < LEAST:
+        near = _distances(colors, board, gain) < (gate * gain) ** 2
+        # what is cut off is at least as bright as it looks: it counts only where less was expected
+        counted, previous = near & (~cut | (expected < logarithm)), counted
+        if int(np.count_nonzero(counted)) < _LEAST:
             return None
-        if np.array_equal(telling, told):
+        if np.array_equal(counted, previous):
             break
-        part = design[telling]
-        solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[telling])
+        part = design[counted]
+        solution = np.linalg.solve(part.T @ part + len(part) * np.diag(_PULL), part.T @ logarithm[counted])
         expected = design @ solution
-    left = float(np.abs((logarithm - expected)[telling]).sum())
-    band = SURE * gate / max(float(board @ board), 1.0) ** 0.5
-    if left > _UNEXPLAINED * left_by_two_materials(logarithm[telling], band):
+    left = float(np.abs((logarithm - expected)[counted]).sum())
+    band = _SURE * gate / max(float(board @ board), 1.0) ** 0.5
+    if left > _UNEXPLAINED * _left_by_two_materials(logarithm[counted], band):
         return None
     if not anchored:
         expected, solution[0] = expected - solution[0], 0.0
     low, high = np.percentile(expected[near], (2.0, 98.0)).tolist()
-    if high - low < (UNEVEN if before is None else _KEPT):
+    if high - low < (_UNEVEN if before is None else _KEPT):
         return None
-    if before is None and int(np.count_nonzero(near)) * (1.0 - LEFT_OUT) <= held:
+    if before is None and int(np.count_nonzero(near)) * (1.0 - _LEFT_OUT) <= held:
         return None
     whole = near & ~cut
-    if int(np.count_nonzero(whole)) >= LEAST:
+    if int(np.count_nonzero(whole)) >= _LEAST:
         board = np.median(colors[whole] / np.exp(expected[whole])[:, None], axis=0).astype(np.float32)
     return LightField(solution, (low - _BEYOND, high + _BEYOND), reach, shape, intrinsics), board
+
+
+def light_of(
+    colors: np.ndarray, board: np.ndarray, paint: np.ndarray | None, gate: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """In which light the board would look like each sample.
+
+    Args:
+        colors: Samples, float32 (n, 3).
+        board: Colour of the board in the light of the reference, float32 (3,).
+        paint: Colour of the paint or None: samples of it have not the board's tint.
+        gate: Distance within which a colour is the board's in that light.
+
+    Returns:
+        The light, times the reference's; which samples are cut off, which have the board's tint in some light or are
+        cut off, and which of these have its colour in the reference's light, (n,) each.
+    """
+    (red, green, blue), (b_red, b_green, b_blue) = colors.T, board
+    size = max(b_red * b_red + b_green * b_green + b_blue * b_blue, np.float32(1.0))
+    light = (red * b_red + green * b_green + blue * b_blue) / size
+    off = np.maximum(red * red + green * green + blue * blue - light * light * size, np.float32(0.0))
+    tint = np.float32(_BOARD_TINT * gate) * light
+    cut = np.maximum(np.maximum(red, green), blue) >= _CUT
+    tinted = cut | ((light > DIMMEST) & (light < BRIGHTEST) & (off < tint * tint))
+    tinted &= squared_distance(colors, paint) > np.float32(gate * gate)
+    # a dark board's colour holds in much light, the paint's on it does not
+    even = tinted & (squared_distance(colors, np.minimum(board, _WHITE)) < np.float32((_SURE * gate) ** 2))
+    even &= np.abs(light - np.float32(1.0)) < np.float32(_UNEVEN)
+    return light, cut, tinted, even
+
+
+def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
+    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, whatever their colour.
+
+    The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
+    """
+    u, v = (axis.take(places) for axis in grid.pixels)
+    z, design = depth[v, u], grid.design.take(places, axis=0)
+    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
+
+
+def _left_by_two_materials(logarithm: np.ndarray, band: float) -> float:
+    """Sum of distances of samples (n,) from the level of their material, the surface's or another one beyond the gate.
+
+    The other is darker or brighter by more than the band, whichever leaves less. Smooth light has every level in
+    between, so that this leaves its slope; materials have one level each, and leave noise alone.
+    """
+    left = []
+    for split in (-band, band):
+        above = logarithm > split
+        count = int(np.count_nonzero(above))
+        total, bright = float(logarithm.sum()), float(logarithm @ above)
+        levels = np.array(((total - bright) / max(len(logarithm) - count, 1), bright / max(count, 1)))
+        left.append(float(np.abs(logarithm - levels[above.view(np.int8)]).sum()))
+    return min(left)
+
+
+def _distances(colors: np.ndarray, board: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Squared distances of colours (n, 3) from the surface's in light (n,), as far as the picture can show it."""
+    difference = colors - np.minimum(light[:, None] * board, _WHITE)
+    return np.vecdot(difference, difference)

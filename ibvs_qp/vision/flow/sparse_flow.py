@@ -1,41 +1,52 @@
-"""Velocity from sparse optical flow, depth and gyro, with a covariance that admits what was not seen."""
+"""Velocity from sparse optical flow, depth and gyro, with a covariance that is large where nothing was seen."""
 
 from __future__ import annotations
+
+import dataclasses
+import math
 
 import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.config import FlowConfig
-from ibvs_qp.vision.flow.solve_velocity import (
-    FlowSurface,
-    FlowVelocity,
-    expected_points,
-    half_resolution,
-    information_root,
-    inverse_depths,
-    solve_velocity,
-    unturned,
-)
+from ibvs_qp.vision.flow.motion import CameraMotion
+from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
+from ibvs_qp.vision.medians import upper_median
 from ibvs_qp.vision.picture.mask import Intrinsics
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 
-#: Pyramid levels beyond the first, needed only where the last velocity does not say where the points are.
+#: Pyramid levels beyond the first, needed only where the last velocity does not predict the points.
 _LEVELS = 2
 #: Most points lie this near to where they were expected [px]: then one level finds them as well as three, to 2e-3 px.
 _NEAR_PX, _MOST = 1.5, 0.8
-#: Points expected farther off than this share of the picture start where they were: the gyro must be wrong.
+#: Points expected farther off than this fraction of the picture start where they were: the gyro must be wrong.
 _FAR = 0.25
 #: When following a point ends: rounds, step [px].
 _CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 15, 0.01)
 
+#: A point within this many residual sigmas of the surface takes the surface's depth, which is far less noisy, and the
+#: least gate, fraction of 1/Z.
+_ON_PLANE_SIGMAS, _ON_PLANE = 4.0, 0.01
+#: Sum of squares of a 3x3 Sobel kernel, and the square of its scale: its weights are eight times those of a derivative.
+_SOBEL_NOISE, _SOBEL = 12.0, 64.0
+#: Distance of the four further places at which the depth of a point is read, and how many must be valid [px].
+_CROSS_PX, _READINGS = 2, 3
+_NO_SURFACE = np.empty(0)
+
 
 class SparseFlow:
-    """Follows points from picture to picture at half resolution."""
+    """Follows points from picture to picture at half resolution.
 
-    def __init__(self, config: FlowConfig) -> None:
-        """Take the settings; no picture yet."""
-        self._config = config
+    Args:
+        config: Settings.
+        camera_position: Camera centre in B [m], (3,).
+    """
+
+    def __init__(self, config: FlowConfig, camera_position: np.ndarray) -> None:
+        self._config, self._camera_position = config, camera_position
         self.reset()
 
     def reset(self) -> None:
@@ -45,96 +56,52 @@ class SparseFlow:
         self._points, self._bearings = np.zeros((0, 2), np.float32), np.zeros((0, 2))
         self._root = np.zeros((0, 2, 2))
         self._inverse = np.zeros(0)
-        self._frames = 0
-        self._stamp_ns = 0
+        self._frames = self._stamp_ns = 0
 
     def update(
         self,
-        rgb: np.ndarray,
-        depth: np.ndarray,
+        frame: RgbdFrame,
         excluded: np.ndarray,
-        intrinsics: Intrinsics,
-        stamp_ns: int,
-        rotation: np.ndarray,
-        camera_rotation: np.ndarray,
+        motion: CameraMotion,
         plane: PlaneEstimate | None,
-        camera_position: np.ndarray,
         busy: bool = False,
     ) -> FlowVelocity | str:
         """Take the next picture.
 
         Args:
-            rgb: Colour, uint8 (H, W, 3).
-            depth: Depth [m], (H, W).
+            frame: Colour and depth.
             excluded: uint8 (H/2, W/2), non-zero where no points may lie.
-            intrinsics: Of the full picture [px].
-            stamp_ns: Capture time.
-            rotation: Turn of the body since the picture before, in B [rad], (3,).
-            camera_rotation: The same turn as a matrix in camera frames, now to before, (3, 3).
+            motion: Turn since the picture before.
             plane: The surface in this picture, or None.
-            camera_position: Camera centre in B [m], (3,).
             busy: Whether the renewal of live points shall wait for the next picture: this one has cost much.
 
         Returns:
             The velocity, or the reason why there is none.
         """
-        result = self._velocity_of(rgb, excluded, intrinsics, stamp_ns, rotation, camera_rotation, camera_position)
-        surface = None if plane is None else FlowSurface(plane.inverse_depth, plane.residual_sigma)
-        self._prepare_points(depth, excluded, intrinsics, surface, busy)
-        return result
-
-    def _velocity_of(
-        self,
-        rgb: np.ndarray,
-        excluded: np.ndarray,
-        intrinsics: Intrinsics,
-        stamp_ns: int,
-        rotation: np.ndarray,
-        camera_rotation: np.ndarray,
-        camera_position: np.ndarray,
-    ) -> FlowVelocity | str:
-        """First half of `update`: the velocity, from the points of the picture before."""
-        config, half = self._config, half_resolution(intrinsics)
-        rows, columns = rgb.shape[0] // 2, rgb.shape[1] // 2
-        whole = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)  # grey first: one channel is shrunk eight times as fast as three
-        grey = cv2.resize(whole[: 2 * rows, : 2 * columns], (columns, rows), interpolation=cv2.INTER_AREA)
-        interval = (stamp_ns - self._stamp_ns) * 1e-9
+        config, half, before = self._config, half_resolution(frame.intrinsics), self._grey
+        rows, columns = frame.rgb.shape[0] // 2, frame.rgb.shape[1] // 2
+        whole = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY)  # one channel is shrunk eight times as fast as three
+        self._grey = cv2.resize(whole[: 2 * rows, : 2 * columns], (columns, rows), interpolation=cv2.INTER_AREA)
+        last_ns, self._stamp_ns = self._stamp_ns, frame.stamp_ns
+        interval = (frame.stamp_ns - last_ns) * 1e-9
         result: FlowVelocity | str = "first picture"
-        if self._grey is not None and grey.shape == self._grey.shape:
+        if before is not None and before.shape == self._grey.shape:
             if not 0.0 < interval <= config.interval_max_s:
                 self._keep(np.zeros(0, np.intp))
                 result = f"{interval:.3f} s between pictures"
             elif len(self._points) < config.min_points:
                 result = "too few points: nothing to follow"
             else:
-                result = self._follow(
-                    self._grey, grey, excluded, half, interval, rotation, camera_rotation, camera_position
-                )
+                result = self._follow(before, self._grey, excluded, half, interval, motion)
         self._velocity = None
         if isinstance(result, FlowVelocity):
             self._velocity = R_BODY_CAMERA.T @ result.velocity
-            middle = self._stamp_ns + (stamp_ns - self._stamp_ns) // 2
-            result = FlowVelocity(
-                velocity=result.velocity, covariance=result.covariance, stamp_ns=middle, points=result.points
-            )
-        self._grey, self._stamp_ns = grey, stamp_ns
-        return result
-
-    def _prepare_points(
-        self,
-        depth: np.ndarray,
-        excluded: np.ndarray,
-        intrinsics: Intrinsics,
-        surface: FlowSurface | None,
-        busy: bool,
-    ) -> None:
-        """Second half of `update`: makes the points of the followed picture ready for the next one."""
-        config = self._config
-        assert self._grey is not None
+            result = dataclasses.replace(result, stamp_ns=last_ns + (frame.stamp_ns - last_ns) // 2)
         self._frames += 1
         if len(self._points) < config.points_low or (self._frames >= config.redetect and not busy):
-            self._find(self._grey, excluded, half_resolution(intrinsics))
-        self._inverse = inverse_depths(self._bearings, depth, intrinsics, surface)
+            self._find(self._grey, excluded, half)
+        self._inverse = inverse_depths(self._bearings, frame.depth, frame.intrinsics, plane)
+        return result
 
     def _find(self, grey: np.ndarray, excluded: np.ndarray, half: Intrinsics) -> None:
         """New points where the picture has structure, with the information each carries."""
@@ -159,12 +126,11 @@ class SparseFlow:
         excluded: np.ndarray,
         half: Intrinsics,
         interval: float,
-        rotation: np.ndarray,
-        camera_rotation: np.ndarray,
-        camera_position: np.ndarray,
+        motion: CameraMotion,
     ) -> FlowVelocity | str:
+        """Velocity by the points of the last picture that are found in this one."""
         config = self._config
-        still = unturned(self._bearings, camera_rotation)
+        still = _unturned(self._bearings, motion.rotation)
         velocity = np.zeros(3) if self._velocity is None else self._velocity
         start = expected_points(still, self._inverse, velocity, interval, half)
         near = np.abs(start - self._points) < _FAR * grey.shape[1]  # false for what is not a number
@@ -187,8 +153,8 @@ class SparseFlow:
             self._root.take(known, axis=0),
             half[0],
             interval,
-            rotation,
-            camera_position,
+            motion.turn,
+            self._camera_position,
             config,
         )
 
@@ -216,3 +182,112 @@ class SparseFlow:
             flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         )
         return found, status
+
+
+def half_resolution(intrinsics: Intrinsics) -> Intrinsics:
+    """Camera of the picture at half resolution (2x2 means: pixel centres shift by half a pixel)."""
+    fx, fy, cx, cy = intrinsics
+    return 0.5 * fx, 0.5 * fy, 0.5 * (cx - 0.5), 0.5 * (cy - 0.5)
+
+
+def information_root(grey: np.ndarray, points: np.ndarray, config: FlowConfig) -> np.ndarray:
+    """Square roots of the information that following each point carries [1/px], symmetric, (n, 2, 2).
+
+    Information is the structure tensor over the window, noise removed, per noise variance, with a floor on the
+    error that structure cannot lower: along a lone edge it vanishes (aperture).
+    """
+    noise = config.grey_sigma**2
+    floor = 2.0 * config.window_px**2 * (_SOBEL_NOISE / _SOBEL) * noise
+    return _information_roots(grey, points, config.window_px // 2, floor, noise, config.pixel_sigma**2)
+
+
+@kernel("f8[:, :, ::1](u1[:, ::1], f4[:, ::1], i8, f8, f8, f8)")
+def _information_roots(
+    grey: np.ndarray, points: np.ndarray, reach: int, floor: float, noise: float, error: float
+) -> np.ndarray:
+    """The same for windows of a half width; `error` is the variance that structure cannot lower [px2]."""
+    (height, width), roots = grey.shape, np.empty((len(points), 2, 2))
+    for i in range(len(points)):
+        u, v = np.int64(np.rint(points[i, 0])), np.int64(np.rint(points[i, 1]))
+        sum_xx, sum_xy, sum_yy = 0, 0, 0
+        for dv in range(-reach, reach + 1):
+            row = min(max(v + dv, 0), height - 1)
+            above, at, below = grey[_mirrored(row - 1, height)], grey[row], grey[_mirrored(row + 1, height)]
+            for du in range(-reach, reach + 1):
+                c = min(max(u + du, 0), width - 1)
+                l, r = _mirrored(c - 1, width), _mirrored(c + 1, width)  # noqa: E741
+                x = np.int64(above[r]) + 2 * np.int64(at[r]) + np.int64(below[r])
+                x -= np.int64(above[l]) + 2 * np.int64(at[l]) + np.int64(below[l])
+                y = np.int64(below[l]) + 2 * np.int64(below[c]) + np.int64(below[r])
+                y -= np.int64(above[l]) + 2 * np.int64(above[c]) + np.int64(above[r])
+                sum_xx, sum_xy, sum_yy = sum_xx + x * x, sum_xy + x * y, sum_yy + y * y
+        xx, xy, yy = sum_xx / _SOBEL, sum_xy / _SOBEL, sum_yy / _SOBEL
+        middle, half = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        high, low = max(0.0, middle + half - floor) / noise, max(0.0, middle - half - floor) / noise
+        high, low = math.sqrt(high / (1.0 + high * error)), math.sqrt(low / (1.0 + low * error))
+        slope, level = (high - low) / (2.0 * half) if half > 0.0 else 0.0, 0.5 * (high + low)
+        roots[i, 0, 0], roots[i, 1, 1] = level + slope * (xx - middle), level + slope * (yy - middle)
+        roots[i, 0, 1] = roots[i, 1, 0] = slope * xy
+    return roots
+
+
+@inner
+def _mirrored(i: int, n: int) -> int:
+    """Index within a row of n, mirrored at its ends without repeating them."""
+    if i < 0:
+        return -i
+    return i if i < n else 2 * n - 2 - i
+
+
+def inverse_depths(
+    bearings: np.ndarray, depth: np.ndarray, intrinsics: Intrinsics, plane: PlaneEstimate | None
+) -> np.ndarray:
+    """1/Z of normalised points (n, 2): the surface's where they lie on it, else their own, 0 if unknown, (n,)."""
+    surface, gate = _NO_SURFACE, 0.0
+    if plane is not None:
+        surface = np.ascontiguousarray(plane.inverse_depth, float)
+        gate = max(_ON_PLANE_SIGMAS * float(plane.residual_sigma), _ON_PLANE)
+    depth = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
+    return _point_depths(bearings, depth, np.array(intrinsics, float), surface, gate)
+
+
+@kernel("f8[::1](f8[:, ::1], f4[:, ::1], f8[::1], f8[::1], f8)")
+def _point_depths(
+    bearings: np.ndarray, depth: np.ndarray, camera: np.ndarray, plane: np.ndarray, gate: float
+) -> np.ndarray:
+    """The same by the median of five readings, or a plane (3,), empty if unknown, within a gate, fraction of 1/Z."""
+    (height, width), (fx, fy, cx, cy), cross = depth.shape, camera, _CROSS_PX
+    steps = ((0, 0), (0, -cross), (0, cross), (-cross, 0), (cross, 0))
+    inverse, readings = np.empty(len(bearings)), np.empty(5)
+    for i in range(len(bearings)):
+        x, y = bearings[i]
+        # held to the picture as floats: a point may be anywhere, or not a number
+        column = np.int64(min(max(float(cross), np.rint(x * fx + cx)), float(width - 1 - cross)))
+        row = np.int64(min(max(float(cross), np.rint(y * fy + cy)), float(height - 1 - cross)))
+        count = 0
+        for down, right in steps:
+            z = depth[row + down, column + right]
+            if z > 0.0 and z < np.inf:
+                readings[count] = z
+                count += 1
+        inverse[i] = np.float32(1.0) / np.float32(upper_median(readings, count)) if count >= _READINGS else 0.0
+        if plane.size and inverse[i] > 0.0:
+            surface = x * plane[0] + y * plane[1] + plane[2]
+            if abs(inverse[i] - surface) < gate * abs(surface):
+                inverse[i] = surface
+    return inverse
+
+
+def _unturned(bearings: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Where normalised points would be now if the camera had only turned (now to before, (3, 3)), (n, 2)."""
+    turned = bearings @ rotation[:2] + rotation[2]  # p^T R
+    return turned[:, :2] / turned[:, 2:]
+
+
+def expected_points(
+    still: np.ndarray, inverse: np.ndarray, velocity: np.ndarray, interval: float, intrinsics: Intrinsics
+) -> np.ndarray:
+    """Pixels of turned points after the camera moved at a velocity in C (3,), float32 (n, 2)."""
+    fx, fy, cx, cy = intrinsics
+    moved = still + (interval * inverse)[:, None] * (still * velocity[2] - velocity[:2])
+    return (moved * (fx, fy) + (cx, cy)).astype(np.float32)

@@ -1,1 +1,1 @@
-"""Lines: search, sub-pixel fit, judgement, tracks and guides."""
+"""Lines: search, sub-pixel fit, score, tracks and guides."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.vision.kernels.borders import EVIDENCE, border_evidence, samples_beyond
+from ibvs_qp.vision.appearance.labels import is_alike
+from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.picture.picture import Picture
 from ibvs_qp.vision.surface.region import SurfaceRegion, depth_gate
 
@@ -14,41 +16,48 @@ from ibvs_qp.vision.surface.region import SurfaceRegion, depth_gate
 _DEPTH_PX = np.array((3.0, 5.0, 8.0, 12.0, 18.0, 26.0, 36.0))
 #: Distances at which colour is read [px at 640]: beyond blur, then farther.
 _COLOR_PX = np.array((4.0, 7.0, 11.0))
-#: Samples of the surface beyond a border count from this distance on [cells], and this share of them rules it out.
+#: Samples of the surface beyond a border count from this distance on [cells], and this fraction of them rules it out.
 _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
-#: Distance from a line at which the surface's samples must lie beside it [cells], and the share of the line beside
-#: which they must: prints, holes and corners are no samples.
-_CELLS_BESIDE, _MOSTLY = 1.5, 0.75
+#: Distance from a line at which the surface's samples must lie beside it [cells], places along it at which they are
+#: looked for, and the fraction of them at which they must lie: prints, holes and corners are no samples.
+_CELLS_BESIDE, _PLACES_BESIDE, _MOSTLY = 1.5, 16, 0.75
 #: Places looked at along a line.
 PLACES = 32
 #: Length that earns half of what a long line earns [px at 640].
 _HALF_LENGTH_PX = 12.0
-#: A border this long, as a share of the surface's size along it, earns all.
+#: A border this long, as a fraction of the surface's size along it, earns all.
 _FULL_SHARE = 0.2
+#: Meaning of a depth reading.
+_UNSEEN, _ON, _FARTHER, _NEARER = 0, 1, 2, 3
+#: Distances within which the surface must be seen on its own side, beyond which it must not be, and within which it
+#: goes on, as places in the list of distances.
+_SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM = 5, 5, 1, 4, 2
+#: Colours on both sides nearer than this are one; beside the bare surface, what goes on is as near to it [grey levels].
+_CONTRAST, _SAME_COLOR = 16.0, 24.0
+#: Colours this near to the paint's are paint [grey levels]: less than the gate of the labels, for no depth confirms it.
+_SAME_PAINT = 30.0
+#: Of the places beyond a line at which colour is read, this many must be the surface's for it to go on.
+_MOST = 2
+#: A border that only colour shows counts this much, and what depth shows where colour does not agree.
+_COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
+#: Least fraction of the places along a line that nothing hides.
+_LEAST_SHARE = 0.15
 
 
 @dataclass(frozen=True)
 class Borders:
-    """n lines scored as ends of the surface, each with the better of its two sides as the surface's side.
+    """n lines scored as ends of the surface, each with the better of its two sides as the surface's side."""
 
-    Attributes:
-        side: +1 if the surface lies where the given normal points, -1 if on the other side, (n,).
-        depth: 0..1, share of the line along which depth says that the surface ends there, (n,).
-        color: 0..1, share along which colour says so, (n,).
-        score: 0..1, all of it together with the length, (n,).
-    """
-
-    side: np.ndarray
-    depth: np.ndarray
-    color: np.ndarray
-    score: np.ndarray
+    side: np.ndarray  # +1 if the surface lies where the given normal points, -1 if on the other side, (n,)
+    depth: np.ndarray  # 0..1, fraction of the line along which the surface ends by depth, (n,)
+    color: np.ndarray  # 0..1, the same by colour, (n,)
+    score: np.ndarray  # 0..1, all of it together with the length, (n,)
 
 
 def score_borders(
     pixels: np.ndarray,
     normals: np.ndarray,
     picture: Picture,
-    depth: np.ndarray,
     region: SurfaceRegion,
     paint: np.ndarray | None,
     places: int = PLACES,
@@ -58,18 +67,17 @@ def score_borders(
     Args:
         pixels: Their end points [px], (n, 2, 2).
         normals: Unit vectors across them [px], (n, 2).
-        picture: Colour, mask and camera.
-        depth: Depth [m], (H, W).
+        picture: Colour, mask, depth and camera.
         region: The surface.
         paint: Colour of the paint on it, RGB (3,), or None if unknown.
         places: Places looked at along each line.
     """
+    assert picture.depth is not None
     grid, ends, normals = region.grid, np.ascontiguousarray(pixels.reshape(-1, 4)), np.ascontiguousarray(normals)
     (a, b, c), (fx, fy, cx, cy) = region.plane.inverse_depth.tolist(), picture.intrinsics
-    evidence, beyond = np.empty((len(ends), 2, EVIDENCE)), np.empty((len(ends), 3))
-    border_evidence(
+    evidence = _border_evidence(
         picture.rgb,
-        np.ascontiguousarray(depth, np.float32),
+        picture.depth,
         picture.mask,
         ends,
         normals,
@@ -79,22 +87,20 @@ def score_borders(
         depth_gate(region.plane),
         np.ascontiguousarray(region.color, float),
         np.empty(0) if paint is None else np.ascontiguousarray(paint, float),
-        region.cells.view(np.uint8),
-        _CELLS_BESIDE * grid.stride,
-        float(grid.stride),
-        float(grid.offset),
         places,
-        evidence,
     )
     rows, columns = np.nonzero(region.colored)
     samples = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
-    samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride, beyond)
+    beyond = _samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride)
     length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
     grown = length / (length + _HALF_LENGTH_PX * picture.scale)
     grown = grown * np.sqrt(np.minimum(length / np.maximum(_FULL_SHARE * beyond[:, 2], 1.0), 1.0))
     scores = evidence[:, :, 0] * grown[:, None] * np.maximum(0.0, 1.0 - beyond[:, :2] / _SHARE_BEYOND)
     if region.by_color:  # a wall has the surface's depth, its joints the surface's colour
-        scores = scores * np.minimum(evidence[:, :, 3] / _MOSTLY, 1.0)
+        aside = _CELLS_BESIDE * grid.stride * np.stack((normals, -normals), axis=1)
+        rows, columns, _ = grid.cells_at(*places_beside(ends, aside, _PLACES_BESIDE))
+        beside = region.cells[rows, columns].mean(axis=2)
+        scores = scores * np.minimum(beside / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
     return Borders(
         side=1 - 2 * best,
@@ -102,3 +108,181 @@ def score_borders(
         color=evidence[each, best, 2],
         score=scores[each, best],
     )
+
+
+def places_beside(
+    segments: np.ndarray, aside: np.ndarray, count: int, margin: float = 0.05
+) -> tuple[np.ndarray, np.ndarray]:
+    """Columns and rows of places along segments (n, 4), moved to both sides (n, 2, 2) [px], (n, 2, count) each.
+
+    A margin, fraction of the length, is left out at either end.
+    """
+    share = margin + (1.0 - 2.0 * margin) * np.arange(count) / (count - 1)
+    first, last = segments[:, :2, None, None], segments[:, 2:, None, None]
+    u, v = (first[:, k] + share * (last[:, k] - first[:, k]) + aside[:, :, k, None] for k in range(2))
+    return u, v
+
+
+@kernel(
+    "f8[:, :, ::1](u1[:, :, ::1], f4[:, ::1], u1[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8,"
+    " f8[::1], f8[::1], i8)"
+)
+def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, paint, places):
+    """Evidence that the surface ends at lines, with the surface along their normals, and against them.
+
+    Depth and colour are read at distances `depth_px` and `color_px` (3,) on both sides of places along the lines; a
+    reading within the gate, fraction of depth, of the plane 1/Z = p u + q v + r is on the surface, `color` and `paint`
+    are its colours, paint empty if unknown. Returns score, fraction by depth and fraction by colour, (n, 2, 3).
+    """
+    states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 3))
+    colors, inside = np.empty((2, 3, 3)), np.empty((2, 3), np.bool_)
+    sums = np.empty((2, 6))
+    for i in range(len(pixels)):
+        sums[:] = 0.0
+        count = 0
+        for k in range(places):
+            share = (k + 0.5) / places
+            u = pixels[i, 0] + share * (pixels[i, 2] - pixels[i, 0])
+            v = pixels[i, 1] + share * (pixels[i, 3] - pixels[i, 1])
+            free = True
+            for side in range(2):
+                sign = 1.0 if side == 0 else -1.0
+                nx, ny = sign * normals[i, 0], sign * normals[i, 1]
+                _read_depth(depth, mask, u, v, nx, ny, depth_px, plane, gate, states[side])
+                free &= _read_color(rgb, mask, u, v, nx, ny, color_px, colors[side], inside[side])
+            if not free:
+                continue
+            count += 1
+            for side in range(2):
+                far = 1 - side
+                _ends_here(states[side], states[far], colors[side], colors[far], inside[far], color, paint, sums[side])
+        for side in range(2):
+            if count < _LEAST_SHARE * places:
+                continue
+            seen, ended, covered, stops, changes, own = sums[side] / count
+            by_depth, by_color = ended * stops, changes * own
+            ends = max(by_depth * (_DEPTH_ONLY + (1.0 - _DEPTH_ONLY) * by_color), _COLOR_ONLY * by_color)
+            evidence[i, side, 0] = seen * ends * (1.0 - covered)
+            evidence[i, side, 1], evidence[i, side, 2] = by_depth, by_color
+    return evidence
+
+
+@inner
+def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states):
+    """Meaning of the depth at growing distances from a place."""
+    height, width = mask.shape
+    for d in range(len(distances)):
+        column, row = round(u + distances[d] * nx), round(v + distances[d] * ny)
+        states[d] = _UNSEEN
+        if column < 0 or row < 0 or column >= width or row >= height or mask[row, column] != 0:
+            continue
+        z = np.float64(depth[row, column])
+        if z > 0.0 and z < np.inf:
+            relative = z * (plane[0] * column + plane[1] * row + plane[2]) - 1.0
+            states[d] = _ON if abs(relative) <= gate else _FARTHER if relative > 0.0 else _NEARER
+
+
+@inner
+def _read_color(rgb, mask, u, v, nx, ny, distances, colors, inside):
+    """Colour at growing distances from a place, the border's beyond the picture; whether nothing hides it."""
+    height, width = mask.shape
+    free = True
+    for d in range(len(distances)):
+        column, row = round(u + distances[d] * nx), round(v + distances[d] * ny)
+        inside[d] = 0 <= column < width and 0 <= row < height
+        column, row = min(max(column, 0), width - 1), min(max(row, 0), height - 1)
+        if mask[row, column] != 0:
+            free = False
+        for c in range(3):
+            colors[d, c] = rgb[row, column, c]
+    return free
+
+
+@inner
+def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, sums):
+    """Add the evidence of one place with the surface on the inner side: seen, ended, covered, goes on, changes, own."""
+    count = len(outer_states)
+    bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
+    own = bare or _is_painted(inner_colors[0], paint)
+    like = 0
+    for d in range(len(outer_colors)):
+        if inside[d] and _is_painted(outer_colors[d], paint):
+            like += 1
+            continue
+        if not inside[d] or not is_alike(outer_colors[d, 0], outer_colors[d, 1], outer_colors[d, 2], color):
+            continue
+        # beside the bare surface the light is known, and what goes on must have its very colour
+        if bare and _apart(outer_colors[d], inner_colors[0]) >= _SAME_COLOR * _SAME_COLOR:
+            continue
+        like += 1
+    goes_on = like >= _MOST and _any(outer_states, _ON_FROM, _ON_TO, _ON)
+    contrast = 0.0
+    for c in range(3):
+        beyond = _middle(outer_colors[0, c], outer_colors[1, c], outer_colors[2, c])
+        before = _middle(inner_colors[0, c], inner_colors[1, c], inner_colors[2, c])
+        contrast += (beyond - before) ** 2
+    changes = contrast > _CONTRAST * _CONTRAST and like < len(outer_colors)
+    sums[0] += 1.0 if _any(inner_states, 0, _SEEN_WITHIN, _ON) else 0.0
+    ended = not _any(outer_states, _ENDED_FROM, count, _ON) and not _any(outer_states, _COVERED_FROM, count, _NEARER)
+    sums[1] += 1.0 if ended and _any(outer_states, 0, count, _FARTHER) else 0.0
+    sums[2] += 1.0 if _any(outer_states, 0, count, _NEARER) else 0.0
+    sums[3] += 0.0 if goes_on else 1.0
+    sums[4] += 1.0 if changes and not goes_on else 0.0
+    sums[5] += 1.0 if own else 0.0
+
+
+@inner
+def _is_painted(color, paint):
+    """Whether a colour is that of the paint; never if that is not known. A wall may be alike in another light."""
+    return len(paint) != 0 and _apart(color, paint) < _SAME_PAINT * _SAME_PAINT
+
+
+@inner
+def _apart(one, two):
+    """Squared distance of two colours (3,)."""
+    return (one[0] - two[0]) ** 2 + (one[1] - two[1]) ** 2 + (one[2] - two[2]) ** 2
+
+
+@inner
+def _middle(one, two, three):
+    """Median of three numbers."""
+    return max(min(one, two), min(max(one, two), three))
+
+
+@inner
+def _any(states, first, last, wanted):
+    """Whether one of the states is the wanted one."""
+    for d in range(first, last):
+        if states[d] == wanted:
+            return True
+    return False
+
+
+@kernel("f8[:, ::1](f8[:, ::1], f8[:, ::1], f8[:, ::1], f8)")
+def _samples_beyond(samples, pixels, normals, margin):
+    """Where samples of the surface (m, 2) [px] lie abreast of lines (n, 4), those within a margin on neither side.
+
+    Returns the fractions that lie against and along the normal, and the size of the surface along the line [px],
+    (n, 3).
+    """
+    found = np.empty((len(pixels), 3))
+    for i in range(len(pixels)):
+        run_u, run_v = pixels[i, 2] - pixels[i, 0], pixels[i, 3] - pixels[i, 1]
+        length = math.hypot(run_u, run_v)
+        du, dv = run_u / length, run_v / length
+        low, high, against, with_it = np.inf, -np.inf, 0, 0
+        for k in range(len(samples)):
+            u, v = samples[k, 0] - pixels[i, 0], samples[k, 1] - pixels[i, 1]
+            along = u * du + v * dv
+            low, high = min(low, along), max(high, along)
+            if along <= 0.0 or along >= length:
+                continue
+            across = u * normals[i, 0] + v * normals[i, 1]
+            if across < -margin:
+                against += 1
+            elif across > margin:
+                with_it += 1
+        total = max(against + with_it, 1)
+        found[i, 0], found[i, 1] = against / total, with_it / total
+        found[i, 2] = high - low if high > low else 0.0
+    return found

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from ibvs_qp.vision.lines.line_state import GUIDE_SIDES, TrackState, no_guides
+from ibvs_qp.vision.lines.line_state import TrackState
 
+#: The four guides, by the side of the surface on which they lie.
+GUIDE_SIDES = ("top", "bottom", "left", "right")
 #: Direction from a guide towards the surface, in the picture (right, down).
 _INWARD = {"top": (0.0, 1.0), "bottom": (0.0, -1.0), "left": (1.0, 0.0), "right": (-1.0, 0.0)}
 #: A line this near to level or upright may be a guide of that direction [deg].
@@ -15,6 +17,11 @@ _WITHIN_DEG = 40.0
 _LEAST_SCORE = 0.30
 #: A challenger takes a guide's place when its score is better by this in two of three pictures.
 _BETTER, _WINS, _WINDOW = 0.08, 2, 3
+
+
+def no_guides() -> dict[str, TrackState | None]:
+    """All four guides absent."""
+    return dict.fromkeys(GUIDE_SIDES)
 
 
 def guide_side(line: TrackState) -> str | None:

@@ -1,18 +1,10 @@
-"""What is told of lines outside: the expected ones that come in, the followed ones that go out."""
+"""Lines at the interface of perception: expected ones come in, followed ones go out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-
-#: The four guides, by the side of the surface on which they lie.
-GUIDE_SIDES = ("top", "bottom", "left", "right")
-
-
-def no_guides() -> dict[str, TrackState | None]:
-    """All four guides absent."""
-    return dict.fromkeys(GUIDE_SIDES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +48,11 @@ class TrackState:
         confirmed: Whether it was seen often enough.
         seen: Whether it was seen in this very picture.
         age: Frames since its start.
-        inlier_share: Share of profiles that agree.
+        inlier_share: Fraction of profiles that agree.
         rms_px: Residual [px].
         length_px: Length of the segment [px].
         score: 0..1, ranks the tracks of one picture; 1 for a hint.
-        confidence: 0..1, share of such lines that are what `kind` says; it falls while the line is not seen.
+        confidence: 0..1, fraction of such lines that are of this kind; it falls while the line is not seen.
         borders_plane: Whether depth said that the surface ends there.
         hint: Name of the hint it answers, or "".
     """

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.flow.camera_motion import CameraMotion
-from ibvs_qp.vision.lines.candidates import Candidate, judge_lines, role_of
-from ibvs_qp.vision.lines.line_state import LineHint
-from ibvs_qp.vision.lines.query import LineQuery
-from ibvs_qp.vision.lines.refine_lines import refine_lines
-from ibvs_qp.vision.lines.refined import RefinedLine
-from ibvs_qp.vision.lines.track import Track
+from ibvs_qp.vision.flow.motion import CameraMotion
+from ibvs_qp.vision.lines.candidates import Candidate, classify_lines, role_of
+from ibvs_qp.vision.lines.line_state import LineHint, TrackState
+from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
 from ibvs_qp.vision.picture.picture import Picture, denormalise
 from ibvs_qp.vision.surface.region import SurfaceRegion
+
+#: Fraction of the new step in a track's running colour step.
+_STEP_BLEND = 0.2
+#: Fraction of the new value in its score and confidence.
+_SCORE_BLEND = 0.5
+#: A line is searched beyond its ends by this fraction of its length or this much, normalised, whichever is more: it
+#: grows into view that fast, and paint over a part of it does not cut it off for good.
+_BEYOND, _AT_LEAST = 0.25, 0.15
 
 #: Uncertainty added per frame on prediction alone: rho and theta, standard deviations.
 _DRIFT = np.diag([2e-3**2, 2e-3**2])
@@ -32,41 +39,126 @@ _BORDER_PX = 7.0
 _PARALLEL = 0.9
 
 
-def _track_of(identity: int, candidate: Candidate, hint: str = "") -> Track:
-    """A new track of a detected line."""
-    track = Track(
-        identity,
-        candidate.line,
-        candidate.role,
-        candidate.kind,
-        candidate.surface_side,
-        candidate.score,
-        candidate.confidence,
-        candidate.borders_plane,
-        hint,
-    )
-    track.adopt(candidate.line)
-    return track
+@dataclass
+class Track:
+    """One line followed over time; its confidence fades while it is not seen, and is whole again when it is."""
+
+    track_id: int
+    line: RefinedLine
+    role: str
+    kind: str
+    surface_side: int
+    score: float
+    confidence: float
+    borders_plane: bool
+    hint: str = ""
+    weight: float = 0.0
+    age: int = 1
+    hits: list[bool] = field(default_factory=lambda: [True])
+    confirmed: bool = False
+    lost_s: float = 0.0
+    fading: float = 1.0
+    rho: float = 0.0
+    theta: float = 0.0
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    step: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @classmethod
+    def of(cls, identity: int, found: Candidate, hint: str = "", **more: Any) -> Track:
+        """A new track of a detected line."""
+        track = cls(
+            track_id=identity,
+            line=found.line,
+            role=found.role,
+            kind=found.kind,
+            surface_side=found.surface_side,
+            score=found.score,
+            confidence=found.confidence,
+            borders_plane=found.borders_plane,
+            hint=hint,
+            **more,
+        )
+        track.adopt(found.line)
+        return track
+
+    @property
+    def settled(self) -> bool:
+        """Whether it is followed in this picture and a detection could add nothing to what is known of it."""
+        return self.confirmed and self.lost_s == 0.0 and (self.borders_plane or self.kind == "paint")
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Range along x (level lines) or y (upright ones) in which it was seen last, normalised."""
+        axis = 1 if abs(math.cos(self.theta)) > abs(math.sin(self.theta)) else 0
+        (first, last) = self.line.segment[:, axis].tolist()
+        return (first, last) if first <= last else (last, first)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Range along x or y in which it is searched: somewhat beyond what was seen last, normalised."""
+        first, last = self.extent
+        more = max(_BEYOND * (last - first), _AT_LEAST)
+        return first - more, last + more
+
+    def blend(self, found: Candidate) -> None:
+        """Blend in what its two sides show in a picture."""
+        self.score += _SCORE_BLEND * (found.score - self.score)
+        self.confidence += _SCORE_BLEND * (found.confidence - self.confidence)
+        self.borders_plane = self.borders_plane or found.borders_plane
+
+    def adopt(self, line: RefinedLine) -> None:
+        """Take a fresh fit; its normal may point the other way."""
+        if self.step.any():
+            line = line.aligned(self.theta)
+        self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
+        self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
+
+    def become(self, other: Track) -> None:
+        """Be what another track on the same edge is; the identity and the line stay."""
+        self.kind, self.borders_plane, self.confidence = other.kind, other.borders_plane, other.confidence
+        self.surface_side = other.surface_side if math.cos(self.theta - other.theta) > 0.0 else -other.surface_side
+
+    def state(self) -> TrackState:
+        """Frozen copy for the outside."""
+        line = self.line
+        return TrackState(
+            track_id=self.track_id,
+            role=self.role,
+            kind=self.kind,
+            surface_side=self.surface_side,
+            rho=self.rho,
+            theta=self.theta,
+            covariance=self.covariance,
+            segment=line.segment,
+            ends=line.ends,
+            weight=self.weight,
+            confirmed=self.confirmed,
+            seen=self.lost_s == 0.0,
+            age=self.age,
+            inlier_share=line.inlier_share,
+            rms_px=line.rms_px,
+            length_px=line.length_px,
+            score=self.score,
+            confidence=self.confidence * self.fading,
+            borders_plane=self.borders_plane,
+            hint=self.hint,
+        )
 
 
 def _leaves(track: Track, picture: Picture) -> bool:
     """Whether all that was seen of a line lies along the picture's border, or beyond it."""
-    (first, last), (cos, sin) = track.extent, (math.cos(track.theta), math.sin(track.theta))
-    height, width = picture.mask.shape
-    if abs(sin) >= abs(cos):
-        places, size = [(x, (track.rho - x * cos) / sin) for x in (first, last)], height
-    else:
-        places, size = [((track.rho - y * sin) / cos, y) for y in (first, last)], width
-    axis, least = (1 if abs(sin) >= abs(cos) else 0), _BORDER_PX * picture.scale
-    across = denormalise(np.array(places), picture.intrinsics)[:, axis]
-    return bool((across < least).all() or (across > size - 1 - least).all())
+    (height, width), (fx, fy, cx, cy), least = picture.mask.shape, picture.intrinsics, _BORDER_PX * picture.scale
+    cos, sin = math.cos(track.theta), math.sin(track.theta)
+    level = abs(sin) >= abs(cos)
+    across, along, focal, center, size = (sin, cos, fy, cy, height) if level else (cos, sin, fx, cx, width)
+    ends = [(track.rho - end * along) / across * focal + center for end in track.extent]
+    return max(ends) < least or min(ends) > size - 1 - least
 
 
 class LineTracker:
     """All tracks of one camera."""
 
     def __init__(self, config: VisionConfig) -> None:
-        """Take the settings; no tracks yet."""
         self._config = config
         self.reset()
 
@@ -138,7 +230,7 @@ class LineTracker:
         for candidate in candidates:
             if not candidate.kind or candidate.score < self._config.detect.min_score:
                 continue
-            fresh = _track_of(0, candidate)
+            fresh = Track.of(0, candidate)
             if _leaves(fresh, picture):
                 continue
             same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
@@ -147,19 +239,17 @@ class LineTracker:
             elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
                 same.adopt(candidate.line)
 
-    def judge(
-        self, picture: Picture, depth: np.ndarray, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None
-    ) -> None:
+    def rescore(self, picture: Picture, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None) -> None:
         """Score anew what the lines seen in this picture border."""
         seen = [track for track in self.tracks if track.lost_s == 0.0 and track.kind == "board"]
         lines = [track.line for track in seen]
-        for track, found in zip(seen, judge_lines(lines, picture, depth, surface, colors, tilt), strict=True):
-            track.judge(found.score, found.confidence, found.borders_plane)
+        for track, found in zip(seen, classify_lines(lines, picture, surface, colors, tilt), strict=True):
+            track.blend(found)
 
     def _start(self, candidate: Candidate, hint: str = "") -> None:
         if len(self.tracks) >= self._config.track.capacity:
             return
-        self.tracks.append(_track_of(self._next_id, candidate, hint))
+        self.tracks.append(Track.of(self._next_id, candidate, hint))
         self._next_id += 1
 
     def _refined(self, picture: Picture, colors: SurfaceColors, strip_px: float) -> list[RefinedLine | None]:
@@ -216,7 +306,7 @@ class LineTracker:
         ]
 
     def _merge(self, picture: Picture, colors: SurfaceColors) -> None:
-        """Of two tracks on one edge the older stays; it is what a caller expects there if no colour tells."""
+        """Of two tracks on one edge the older stays; without distinct colours it becomes what a caller expects."""
         kept: list[Track] = []
         for track in self.tracks:
             twin = next((other for other in kept if self._same(other, track, picture)), None)

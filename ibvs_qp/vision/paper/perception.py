@@ -9,16 +9,15 @@ from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.flow.camera_motion import CameraMotion
+from ibvs_qp.vision.flow.motion import CameraMotion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
 from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.lines.line_state import LineHint
-from ibvs_qp.vision.lines.track import Track
-from ibvs_qp.vision.make_result import make_result
+from ibvs_qp.vision.lines.tracks import Track
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception_result import PerceptionResult, make_result
 from ibvs_qp.vision.surface.layout import PictureLayout
 from ibvs_qp.vision.surface.seeds import UP_LEFT, facing
 
@@ -45,7 +44,7 @@ class PaperPerception:
     ) -> None:
         self._config, self._vision, self._vehicle, self._inwards = config, vision, vehicle, inwards
         self._camera_position = np.asarray(vehicle.camera_position_m, float)
-        self._flow, self._gate = SparseFlow(vision.flow), PictureGate()
+        self._flow, self._gate = SparseFlow(vision.flow, self._camera_position), PictureGate()
         self._layout: PictureLayout | None = None
         self.reset()
 
@@ -103,17 +102,7 @@ class PaperPerception:
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
         self._stamp_ns = frame.stamp_ns
         motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
-        flow = self._flow.update(
-            frame.rgb,
-            frame.depth,
-            layout.excluded,
-            frame.intrinsics,
-            frame.stamp_ns,
-            turn,
-            motion.rotation,
-            found.plane,
-            self._camera_position,
-        )
+        flow = self._flow.update(frame, layout.excluded, motion, found.plane)
         times = dict(found.time_ms)
         clock.lap("flow")
         followed = [
@@ -150,18 +139,4 @@ class PaperPerception:
         self._age[track_id] = 0 if chosen is None else self._age[track_id] + 1
         if chosen is None:
             return None
-        track = Track(
-            track_id=track_id,
-            line=chosen.line,
-            role=chosen.role,
-            kind=chosen.kind,
-            surface_side=chosen.surface_side,
-            score=chosen.score,
-            confidence=chosen.confidence,
-            borders_plane=chosen.borders_plane,
-            weight=1.0,
-            age=self._age[track_id],
-            confirmed=True,
-        )
-        track.adopt(chosen.line)
-        return track
+        return Track.of(track_id, chosen, weight=1.0, age=self._age[track_id], confirmed=True)

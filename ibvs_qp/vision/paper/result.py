@@ -9,11 +9,11 @@ import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.lines.candidates import Candidate
-from ibvs_qp.vision.lines.refined import RefinedLine
+from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.paper.box import SurfaceBox
 from ibvs_qp.vision.picture.mask import Intrinsics
 from ibvs_qp.vision.picture.picture import normalise, normalised_line
-from ibvs_qp.vision.surface.estimate import PlaneEstimate
+from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: The published pipeline rates no line: every line has this confidence [-].
 CONFIDENCE = 0.5

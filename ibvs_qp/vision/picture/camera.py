@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ibvs_qp.config.field_of_view import straightened_intrinsics
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.checks import frame_problem
-from ibvs_qp.vision.picture.convert import to_color, to_metres
-from ibvs_qp.vision.picture.lens import Lens
-from ibvs_qp.vision.picture.rectification import Rectification
+from ibvs_qp.vision.picture.lens import Lens, Rectification
+from ibvs_qp.vision.picture.registration import Registration
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
-
-if TYPE_CHECKING:
-    from ibvs_qp.vision.picture.registration import Registration
 
 #: Longest side of a depth picture [px].
 _LARGEST = 4096
@@ -50,7 +45,8 @@ class RgbdCamera:
         self._rectification: Rectification | None = None
         self._registration: Registration | None = None
         if not self._settings.registered:  # compiled here, not at the first picture in flight
-            self._new_registration((1, 1), (1, 1), (1.0, 1.0, 0.0, 0.0)).depth(np.ones((1, 1), np.float32))
+            tiny = Registration(self._settings, self.lens.rotation, ((1, 1), (1, 1)), self._intrinsics)
+            tiny.depth(np.ones((1, 1), np.float32))
 
     def picture(self, raw: RgbdFrame) -> RgbdFrame:
         """The picture for perception; of one that it refuses, what can be read.
@@ -96,15 +92,9 @@ class RgbdCamera:
         if not self.lens.none:
             self._rectification = Rectification(self.lens, shape, intrinsics, self._intrinsics)
         if not self._settings.registered:
-            self._registration = self._new_registration(frame.depth.shape, shape, self._intrinsics)
+            shapes = frame.depth.shape, shape
+            self._registration = Registration(self._settings, self.lens.rotation, shapes, self._intrinsics)
         self._key = key
-
-    def _new_registration(
-        self, depth: tuple[int, int], color: tuple[int, int], intrinsics: tuple[float, ...]
-    ) -> Registration:
-        from ibvs_qp.vision.picture.registration import Registration
-
-        return Registration(self._settings, self.lens.rotation, (depth, color), intrinsics)
 
 
 def _is_depth(depth: np.ndarray) -> bool:
@@ -112,3 +102,32 @@ def _is_depth(depth: np.ndarray) -> bool:
     if type(depth) is not np.ndarray or depth.ndim != 2 or depth.dtype.kind != "f":
         return False
     return 0 < min(depth.shape) and max(depth.shape) <= _LARGEST
+
+
+def to_color(picture: np.ndarray, bits: int = 16) -> np.ndarray:
+    """Colour of 8 bits, (H, W, 3), from a colour or mono picture.
+
+    Args:
+        picture: uint8 or uint16, (H, W), (H, W, 1) or (H, W, 3).
+        bits: Bits in use of a uint16.
+    """
+    if type(picture) is not np.ndarray or picture.ndim not in (2, 3):
+        return picture
+    if picture.dtype.kind == "u" and picture.dtype.itemsize == 2:
+        picture = np.minimum(picture >> (bits - 8), 255).astype(np.uint8)
+    if picture.ndim == 2 or picture.shape[2] == 1:
+        height, width = picture.shape[:2]
+        picture = np.repeat(picture.reshape(height, width, 1), 3, axis=2)
+    return picture
+
+
+def to_metres(picture: np.ndarray, units_per_metre: float) -> np.ndarray:
+    """Depth [m], float32 where the unit had to be changed.
+
+    Args:
+        picture: Integers or floating point, (H, W); integers without a stated unit stay as they are.
+        units_per_metre: Values per metre, 1 for none stated.
+    """
+    if type(picture) is not np.ndarray or picture.dtype.kind not in "uif" or units_per_metre == 1.0:
+        return picture
+    return picture.astype(np.float32) * np.float32(1.0 / units_per_metre)

@@ -1,4 +1,4 @@
-"""Pixels of a real camera, turned and with a lens, and normalised points of the ideal one in its place."""
+"""A real camera, turned and with a lens, and the ideal one in its place: points of both, and rectified pictures."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 _STEPS, _ACCURACY = 20, 1e-6
 #: Larger errors are of pixels outside the range of a lens model, which has no ray for them [-].
 _NO_RAY = 1e-3
+#: Least depth of a ray of the real camera per depth in C [-]: the others come from beside or behind it.
+_LEAST_DEPTH = 0.1
 
 
 def camera_matrix(intrinsics: Sequence[float]) -> np.ndarray:
@@ -76,3 +78,39 @@ def _bent(rays: np.ndarray, matrix: np.ndarray, distortion: np.ndarray) -> np.nd
     """Pixels, (n, 2), of rays in the camera's own axes, (n, 3)."""
     zero, lens = np.zeros(3), distortion if distortion.size else None
     return cv2.projectPoints(rays[:, None], zero, zero, matrix, lens)[0].reshape(-1, 2)
+
+
+class Rectification:
+    r"""Tables of one camera: the ray of every ideal pixel is looked up in the real picture.
+
+    The pixel of the ray :math:`r` in C shows what the real camera sees along :math:`R^T r`, bent by its lens; a depth z
+    of the real picture is :math:`z / (R^T r)_z` in C, with r scaled to a depth of 1. Beyond the border of the real
+    picture the colour of the border goes on, so that no edge is added, and the depth is invalid.
+
+    Args:
+        lens: Lens and mount.
+        shape: Height and width of the picture [px].
+        intrinsics: (fx, fy, cx, cy) of the real picture [px].
+        ideal: The same of the ideal picture.
+    """
+
+    def __init__(self, lens: Lens, shape: tuple[int, int], intrinsics: Sequence[float], ideal: Sequence[float]) -> None:
+        fx, fy, cx, cy = ideal
+        self._columns, self._rows = cv2.initUndistortRectifyMap(
+            camera_matrix(intrinsics), lens.distortion, lens.rotation, camera_matrix(ideal), shape[::-1], cv2.CV_32FC1
+        )
+        x = (np.arange(shape[1]) - cx) / fx
+        y = (np.arange(shape[0])[:, None] - cy) / fy
+        a, b, c = lens.rotation.T[2]
+        depth = (a * x + b * y + c).astype(np.float32)
+        self._columns[depth < _LEAST_DEPTH] = -np.inf
+        self._per_depth = 1.0 / np.maximum(depth, np.float32(_LEAST_DEPTH))
+
+    def color(self, rgb: np.ndarray) -> np.ndarray:
+        """The ideal picture, uint8 (H, W, 3), of a real one."""
+        return cv2.remap(rgb, self._columns, self._rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+    def depth(self, depth: np.ndarray) -> np.ndarray:
+        """Depth in C [m], float32 (H, W), of depth registered to the real picture [m]."""
+        real = depth.astype(np.float32, copy=False)
+        return cv2.remap(real, self._columns, self._rows, cv2.INTER_NEAREST, borderValue=0) * self._per_depth

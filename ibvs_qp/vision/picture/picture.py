@@ -13,23 +13,14 @@ from ibvs_qp.vision.picture.mask import Intrinsics
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A colour picture with the vehicle's mask, and what depth tells of it.
+    """A colour picture with the vehicle's mask, depth and surface."""
 
-    Attributes:
-        rgb: The picture itself, uint8 (H, W, 3).
-        mask: Non-zero where the vehicle hides the view, uint8 (H, W).
-        intrinsics: (fx, fy, cx, cy) [px].
-        scale: Factor for settings in pixels of a 640 wide picture.
-        depth: Depth of every pixel [m], float32 (H W,), or None.
-        plane: (a, b, c) of the working surface, or None.
-    """
-
-    rgb: np.ndarray
-    mask: np.ndarray
-    intrinsics: Intrinsics
-    scale: float
-    depth: np.ndarray | None = None
-    plane: tuple[float, float, float] | None = None
+    rgb: np.ndarray  # the picture itself, uint8 (H, W, 3)
+    mask: np.ndarray  # non-zero where the vehicle hides the view, uint8 (H, W)
+    intrinsics: Intrinsics  # (fx, fy, cx, cy) [px]
+    scale: float  # factor for settings in pixels of a 640 wide picture
+    depth: np.ndarray | None = None  # depth [m], float32 (H, W), or None
+    plane: tuple[float, float, float] | None = None  # (a, b, c) of the working surface, or None
 
     @classmethod
     def of(
@@ -44,9 +35,9 @@ class Picture:
         return cls(
             rgb=np.ascontiguousarray(rgb),
             mask=np.ascontiguousarray(mask),
-            intrinsics=intrinsics,
+            intrinsics=(float(intrinsics[0]), float(intrinsics[1]), float(intrinsics[2]), float(intrinsics[3])),
             scale=max(mask.shape) / REFERENCE_WIDTH,
-            depth=None if depth is None else np.ascontiguousarray(depth, np.float32).ravel(),
+            depth=None if depth is None else np.ascontiguousarray(depth, np.float32),
             plane=None if plane is None else (float(plane[0]), float(plane[1]), float(plane[2])),
         )
 

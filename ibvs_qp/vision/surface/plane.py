@@ -1,177 +1,270 @@
-"""The working surface as a plane in inverse depth, 1/Z = a x + b y + c, fitted robustly through a seed."""
+"""The working surface as a plane in inverse depth, 1/Z = a x + b y + c, refitted around a plane of before."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Protocol
+from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import BOARD, OTHER
+from ibvs_qp.vision.appearance.labels import BOARD, PAINT
+from ibvs_qp.vision.compilation import kernel
 from ibvs_qp.vision.config import PlaneConfig
+from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
 from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.estimate import PlaneEstimate
-from ibvs_qp.vision.surface.hypotheses import judged_planes
-from ibvs_qp.vision.surface.refit_plane import PlaneRefit
-from ibvs_qp.vision.surface.seeds import seed_values
 
-#: Side of the blocks over which residuals are averaged to measure their correlation [samples].
+#: Samples per row of a search against those of the sparser grid on which a surface is followed: the noise is correlated
+#: over 20 px of 640, so that the mean of four neighbours every 16 px is as good as one reading every 8 px.
+SPARSER = 2
+#: Gate of what looks like paint in either round, fraction of the board's: a wall that looks like paint must not get in,
+#: so what looks like it counts in the last round of a search only, and has to fit twice as well. For a followed surface
+#: half of the first gate (1.25 % of depth), and more than two sigmas of the last one, lie well within 4 %, a gap of
+#: 0.02 m at 0.5 m.
+_PAINT_SEARCHED, _PAINT_FOLLOWED = (0.0, 0.5), (0.5, 0.75)
+#: Side of the blocks over which residuals are averaged to measure their correlation [samples of a search].
 _BLOCK = 8
-#: Gate of what looks like paint in either round, share of the board's: a wall that looks like paint must not get in, so
-#: what looks like it counts in the last round only, and has to fit twice as well.
-_PAINT_GATES = (0.0, 0.5)
+#: Samples used to measure the spread of residuals; more cost time and change nothing.
+_SPREAD = 400
+#: Smallest determinant of the normal matrix, fraction of the product of its diagonal.
+_FLAT = 1e-6
+#: Planes are held in front of the camera: least 1/Z [1/m].
+_FARTHEST = 1e-3
+_NO_LABELS = np.empty(0, np.uint8)
 
 
-class LabelsOfSeeds(Protocol):
-    """Colour labels for the seed of an index: a list, or something that makes them when they are looked at."""
+@dataclass(frozen=True, kw_only=True)
+class PlaneEstimate:
+    """A fitted surface in the camera frame.
 
-    def __getitem__(self, index: int, /) -> np.ndarray:
-        """Labels of the samples, uint8 (rows, columns)."""
-        ...
+    Attributes:
+        inverse_depth: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
+        covariance: Of (a, b, c), correlated noise and the frame's common mode included, (3, 3).
+        normal: Outward unit normal (towards the camera) in C, (3,).
+        distance_m: Distance of the camera centre from the plane [m].
+        inlier_share: Fraction of the valid samples of the whole picture that belong to the surface.
+        residual_sigma: Standard deviation of the residuals, fraction of depth.
+        component: Samples of the surface, bool (rows, columns) of the coarse grid.
+    """
+
+    inverse_depth: np.ndarray
+    covariance: np.ndarray
+    normal: np.ndarray
+    distance_m: float
+    inlier_share: float
+    residual_sigma: float
+    component: np.ndarray
+
+    @property
+    def abcd(self) -> tuple[float, float, float, float]:
+        """Plane (A, B, C, D) with D = -1."""
+        a, b, c = (float(entry) for entry in self.inverse_depth)
+        return a, b, c, -1.0
 
 
-class PlaneFitter:
-    """Finds the surface through a seed and follows it from frame to frame."""
+def refit_plane(
+    grid: CoarseGrid,
+    inverse: np.ndarray,
+    labels: np.ndarray | None,
+    start: np.ndarray,
+    down: np.ndarray | None,
+    config: PlaneConfig,
+    *,
+    sigma: float | None = None,
+    seed: tuple[int, int] | None = None,
+) -> PlaneEstimate | str:
+    """Two rounds of least squares on one grid, each within a gate.
 
-    def __init__(self, config: PlaneConfig) -> None:
-        """Take the settings and start its own random generator."""
-        self._config = config
-        self._grid: CoarseGrid | None = None
-        self._refit: PlaneRefit | None = None
-        self.reset()
+    Args:
+        grid: Where the samples lie.
+        inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns); means if the surface is followed.
+        labels: Colour labels of the samples, uint8 (rows, columns), or None.
+        start: (a, b, c) to start from, (3,).
+        down: Gravity's direction in C, unit, (3,), or None if unknown.
+        config: Gates and limits.
+        sigma: Spread of the residuals of a followed surface, fraction of depth, which sets the last gate; None measures
+            it in each round.
+        seed: The surface is the part around this sample; None takes the largest.
 
-    def reset(self) -> None:
-        """Start again as new: same pictures, same bits."""
-        self._random = np.random.default_rng(np.random.SeedSequence(self._config.random_seed))
+    Returns:
+        The surface, or the reason why there is none.
+    """
+    searched = sigma is None
+    design, block, paint_gates = grid.design, _BLOCK, _PAINT_SEARCHED
+    least = config.min_samples
+    if not searched:
+        design, block, paint_gates = grid.corners, _BLOCK // SPARSER, _PAINT_FOLLOWED
+        least = max(config.min_samples // SPARSER**2, 3)
+    flat = np.ascontiguousarray(inverse, float).reshape(-1)
+    colors = _NO_LABELS if labels is None else np.ascontiguousarray(labels).reshape(-1)
+    usable = (flat > 0.0) & grid.free.reshape(-1)
+    seen = int(np.count_nonzero(usable))
+    if seen < least:
+        return "too few valid depth samples"
+    plane, gate, spread = np.array(start, float), config.coarse_gate, sigma or 0.0
+    normal_matrix_inverse, component, count = np.empty((3, 3)), grid.free, 0
+    for last in (False, True):
+        relative, near = choose_samples(design, flat, usable, colors, plane, searched, gate, paint_gates[last], least)
+        if last and not searched:  # before the last gate, which would make the spread look smaller
+            spread = MAD_TO_SIGMA * median(np.abs(relative[component.reshape(-1)]))
+        component = near.reshape(grid.shape)
+        if last or searched:
+            component = connected_samples(component, grid, seed)
+        count = int(np.count_nonzero(component))
+        if count < least:
+            noise = depth_noise(flat.reshape(grid.shape))
+            if noise > config.sound_scatter and np.count_nonzero(near) >= least:
+                return f"depth scatters by {100.0 * noise:.1f} % from sample to sample: no surface holds together"
+            return "too few samples on the surface"
+        solved, plane, normal_matrix_inverse = fit_plane(design, flat, component.reshape(-1))
+        if not solved:
+            return "samples on the surface lie on one line"
+        if searched:
+            some = relative[component.reshape(-1)][:: max(1, count // _SPREAD)]
+            spread = MAD_TO_SIGMA * median(np.abs(some - median(some)))
+        wanted = config.fine_gate_sigmas * (spread if sigma is None else sigma)
+        gate = min(max(wanted, config.fine_gate_low), config.fine_gate_high)
+    length = math.hypot(*plane.tolist())
+    upright = float(plane[2]) > math.cos(math.radians(config.max_oblique_deg)) * length
+    if down is not None:
+        upright &= abs(float(plane @ down)) < math.sin(math.radians(config.max_lean_deg)) * length
+    if not upright:
+        return "the surface does not stand upright or does not face the camera"
+    if not config.distance_min_m <= 1.0 / length <= config.distance_max_m:
+        return f"the surface lies {1.0 / length:.2f} m away, out of range"
+    # residuals that hold together over blocks inflate the covariance of least squares; plus the frame's common mode
+    total, blocks = residual_squares(design, flat, component, plane, block)
+    inflation = max(1.0, blocks / total) if total > 0.0 else 1.0
+    variance = total / max(count - 3.0, 1.0) * inflation
+    common = config.common_mode_m**2 * float(plane @ plane)
+    return PlaneEstimate(
+        inverse_depth=plane,
+        covariance=normal_matrix_inverse * variance + plane[:, None] * plane * common,
+        normal=plane * (-1.0 / length),
+        distance_m=1.0 / length,
+        inlier_share=count / seen,
+        residual_sigma=spread,
+        component=component,
+    )
 
-    def search(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        seeds: list[tuple[int, int]],
-        down: np.ndarray | None,
-        prefer: LabelsOfSeeds | None,
-    ) -> PlaneEstimate | str:
-        """Find the surface without a prediction.
 
-        Args:
-            grid: Where the samples lie.
-            inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
-            seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first. At the
-                same depth the first one counts: a row begins at its right end, so its left is surely on the surface.
-            down: Gravity's direction in C, unit, (3,), or None if unknown.
-            prefer: Colour labels of the samples for each seed, uint8 (rows, columns) each, or None.
+def connected_samples(inlier: np.ndarray, grid: CoarseGrid, seed: tuple[int, int] | None) -> np.ndarray:
+    """Connected inliers around the seed (the largest, without one); hidden samples connect."""
+    _, labels = cv2.connectedComponents((inlier | ~grid.free).view(np.uint8), connectivity=4, ltype=cv2.CV_16U)
+    if seed is not None:
+        rows, columns = grid.window(seed, 2)
+        around = labels[rows, columns][inlier[rows, columns]]
+        counts = np.bincount(around) if len(around) else np.zeros(1)
+    else:
+        counts = np.bincount(labels.ravel().take(np.flatnonzero(inlier)), minlength=1)
+    label = int(np.argmax(counts))
+    return inlier & (labels == label) if counts[label] > 0 else np.zeros_like(inlier)
 
-        Returns:
-            The surface, or the reason why there is none.
-        """
-        values = seed_values(grid, inverse, seeds, self._config.seed_radius)
-        order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
-        reason = "no valid depth around the seed"
-        for index, wanted in self._attempts(order, values, seeds, prefer):
-            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
-            if start is None:
-                reason = "no plane through the seed stands upright and faces the camera"
-                continue
-            result = self._refine(grid, inverse, start, seeds[index], down, wanted)
-            if isinstance(result, PlaneEstimate):
-                return result
-            reason = result
-        return reason
 
-    def _attempts(
-        self, order: list[int], values: list[float], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds | None
-    ) -> Iterator[tuple[int, np.ndarray | None]]:
-        """Seeds to try with labels of their colour or without, the likeliest first.
+def depth_noise(inverse: np.ndarray) -> float:
+    r"""Noise of single depth samples by their second differences along rows, which are zero on every plane.
 
-        A seed on an edge may have a colour that nearly nothing else has. Without colour its plane would tilt through
-        the surface and a wall behind it, so seeds at the same depth with a colour of their own come before it.
-        """
-        if prefer is None or not order:
-            yield from ((index, None) for index in order)
-            return
-        flush = [index for index in order if values[index] > (1.0 - self._config.coarse_gate) * values[order[0]]]
-        if len(order) > 1:
-            order = self._first_of_flush(order, flush, seeds, prefer)
-            flush = [index for index in order if index in flush]
-        tried = set()
-        for index in flush:
-            if int(np.count_nonzero(prefer[index] == BOARD)) >= self._config.min_samples:
-                tried.add(index)
-                yield index, prefer[index]
-        for index in order:
-            if index not in tried:
-                yield index, prefer[index]
-            yield index, None
+    .. math:: \sigma = \frac{1.4826}{\sqrt 6} \operatorname{median} \frac{|w_{k-1} - 2 w_k + w_{k+1}|}{w_k}
 
-    @staticmethod
-    def _first_of_flush(
-        order: list[int], flush: list[int], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds
-    ) -> list[int]:
-        """The order of seeds, with the first listed one in front where the nearest one differs from it by colour only.
+    Args:
+        inverse: 1/Z of the samples w [1/m], 0 where absent, (rows, columns).
 
-        A board that is flush with its wall cannot be told from it by depth.
-        """
-        first = min(flush)
-        if first == order[0]:
-            return order
-        labels = prefer[first]
-        if labels[seeds[first]] == OTHER or labels[seeds[order[0]]] != OTHER:
-            return order
-        return [first, *(index for index in order if index != first)]
+    Returns:
+        Standard deviation as a fraction of depth [-]; 0 where no three samples lie side by side.
+    """
+    left, middle, right = inverse[:, :-2], inverse[:, 1:-1], inverse[:, 2:]
+    there = (left > 0.0) & (middle > 0.0) & (right > 0.0)
+    bends = np.abs(left - 2.0 * middle + right)[there] / middle[there]
+    return MAD_TO_SIGMA / math.sqrt(6.0) * median(bends) if bends.size else 0.0
 
-    def track(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        predicted: np.ndarray,
-        down: np.ndarray | None,
-        prefer: np.ndarray | None,
-        seed: tuple[int, int] | None = None,
-    ) -> PlaneEstimate | str:
-        """Follow the surface from predicted (a, b, c), without random search; it is the part around a seed if given."""
-        return self._refine(grid, inverse, predicted, seed, down, prefer)
 
-    def _hypothesis(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        seed: tuple[int, int],
-        value: float,
-        down: np.ndarray | None,
-        prefer: np.ndarray | None,
-    ) -> np.ndarray | None:
-        """Best of many planes through the seed and two random samples near it."""
-        tried = judged_planes(self._config, grid, inverse, seed, value, prefer, self._random)
-        if tried is None:
-            return None
-        planes, score = tried
-        score = score * self._upright(planes, down)
-        best = int(np.argmax(score))
-        return planes[best] if score[best] > 0 else None
+@kernel("Tuple((f8[::1], b1[::1]))(f8[:, ::1], f8[::1], b1[::1], u1[::1], f8[::1], b1, f8, f8, i8)")
+def choose_samples(
+    design: np.ndarray,
+    inverse: np.ndarray,
+    usable: np.ndarray,
+    labels: np.ndarray,
+    plane: np.ndarray,
+    own_depth: bool,
+    gate: float,
+    paint_gate: float,
+    least: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Usable samples (n,) within a gate of a plane, those of the surface's colours alone where at least so many are.
 
-    def _upright(self, planes: np.ndarray, down: np.ndarray | None) -> np.ndarray:
-        """Whether planes (n, 3) face the camera and, if gravity is known, stand upright."""
-        length = np.linalg.norm(planes, axis=1)
-        good = planes[:, 2] > math.cos(math.radians(self._config.max_oblique_deg)) * length
-        if down is not None:
-            good &= np.abs(planes @ down) < math.sin(math.radians(self._config.max_lean_deg)) * length
-        return good
+    What looks like paint counts within a fraction of the gate. Distances are fractions of the samples' own depth or the
+    plane's, undefined where not usable; returned with the chosen samples, (n,) each.
+    """
+    relative = np.empty(len(inverse))
+    near = np.zeros(len(inverse), np.bool_)
+    colored = np.zeros(len(inverse), np.bool_)
+    count = 0
+    for i in range(len(inverse)):
+        if not usable[i]:
+            continue
+        at = design[i, 0] * plane[0] + design[i, 1] * plane[1] + design[i, 2] * plane[2]
+        relative[i] = (inverse[i] / max(at, _FARTHEST) if own_depth else at / inverse[i]) - 1.0
+        away = abs(relative[i])
+        near[i] = away < gate
+        if near[i] and labels.size > 0:
+            colored[i] = labels[i] == BOARD or (labels[i] == PAINT and away < paint_gate * gate)
+            count += colored[i]
+    return relative, colored if labels.size > 0 and count >= least else near
 
-    def _refine(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        start: np.ndarray,
-        seed: tuple[int, int] | None,
-        down: np.ndarray | None,
-        prefer: np.ndarray | None,
-    ) -> PlaneEstimate | str:
-        """Two rounds of least squares within gates that the residuals set, around a start."""
-        if self._refit is None or grid is not self._grid:
-            self._grid, least = grid, self._config.min_samples
-            self._refit = PlaneRefit(
-                self._config, grid, grid.design, least=least, block=_BLOCK, paint_gates=_PAINT_GATES
-            )
-        return self._refit.refit(inverse, prefer, start, down, seed=seed)
+
+@kernel("Tuple((b1, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], b1[::1])")
+def fit_plane(design: np.ndarray, inverse: np.ndarray, chosen: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+    """Least squares over chosen samples, by cofactors.
+
+    Returns:
+        Whether the samples determine a plane, (a, b, c), (3,), and the inverse of the normal matrix, (3, 3).
+    """
+    xx = xy = x = yy = y = one = xd = yd = d = 0.0
+    for i in range(len(inverse)):
+        if not chosen[i]:
+            continue
+        u, v, w = design[i, 0], design[i, 1], inverse[i]
+        xx, xy, x, yy, y, one = xx + u * u, xy + u * v, x + u, yy + v * v, y + v, one + 1.0
+        xd, yd, d = xd + u * w, yd + v * w, d + w
+    normal = np.empty((3, 3))
+    normal[0, 0] = yy * one - y * y
+    normal[0, 1] = normal[1, 0] = x * y - xy * one
+    normal[0, 2] = normal[2, 0] = xy * y - x * yy
+    normal[1, 1] = xx * one - x * x
+    normal[1, 2] = normal[2, 1] = xy * x - xx * y
+    normal[2, 2] = xx * yy - xy * xy
+    determinant = xx * normal[0, 0] + xy * normal[0, 1] + x * normal[0, 2]
+    scale, plane = 1.0 / determinant, np.empty(3)
+    for row in range(3):
+        for column in range(3):
+            normal[row, column] *= scale
+        plane[row] = normal[row, 0] * xd + normal[row, 1] * yd + normal[row, 2] * d
+    return determinant >= _FLAT * xx * yy * one, plane, normal
+
+
+@kernel("UniTuple(f8, 2)(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], i8)")
+def residual_squares(
+    design: np.ndarray, inverse: np.ndarray, component: np.ndarray, plane: np.ndarray, block: int
+) -> tuple[float, float]:
+    """Sum of the squares of residuals [1/m^2] over the component, and of their sums over blocks of so many samples.
+
+    Residuals that hold together add up in the latter.
+    """
+    rows, columns = component.shape
+    residual = np.zeros((rows, columns))
+    total = blocks = 0.0
+    for r in range(rows):
+        for c in range(columns):
+            if component[r, c]:
+                i = r * columns + c
+                at = design[i, 0] * plane[0] + design[i, 1] * plane[1] + design[i, 2] * plane[2]
+                residual[r, c] = inverse[i] - at
+                total += residual[r, c] * residual[r, c]
+    for top in range(0, rows - block + 1, block):
+        for left in range(0, columns - block + 1, block):
+            together = 0.0
+            for r in range(top, top + block):
+                for c in range(left, left + block):
+                    together += residual[r, c]
+            blocks += together * together
+    return total, blocks

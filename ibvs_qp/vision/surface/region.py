@@ -7,32 +7,23 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.kernels.borders import alike
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.estimate import PlaneEstimate, connected_samples
+from ibvs_qp.vision.picture.grid import CoarseGrid, Samples
+from ibvs_qp.vision.surface.plane import PlaneEstimate, connected_samples
 
-#: A reading within this share of depth is on the surface at least and at most; three sigmas of the fit between.
+#: A reading within this fraction of depth is on the surface at least and at most; three sigmas of the fit between.
 _GATE_LOW, _GATE_HIGH, _GATE_SIGMAS = 0.010, 0.022, 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceRegion:
-    """The surface in one picture.
+    """The surface in one picture."""
 
-    Attributes:
-        grid: Coarse grid of the picture.
-        plane: Its plane.
-        cells: Samples on it by depth, bool (rows, columns).
-        colored: Those of them that have its colour, bool (rows, columns).
-        color: Its colour where nothing is printed or painted on it, RGB (3,).
-        by_color: Whether colour or light tell it from a wall that depth cannot; `cells` are without the wall then.
-    """
-
-    grid: CoarseGrid
-    plane: PlaneEstimate
-    cells: np.ndarray
-    colored: np.ndarray
-    color: np.ndarray
+    grid: CoarseGrid  # coarse grid of the picture
+    plane: PlaneEstimate  # its plane
+    cells: np.ndarray  # samples on it by depth, bool (rows, columns)
+    colored: np.ndarray  # those of them that have its colour, bool (rows, columns)
+    color: np.ndarray  # its colour where nothing is printed or painted on it, RGB (3,)
+    # whether colour or light separate it from a wall at its depth; `cells` are without the wall then
     by_color: bool = False
 
     def end_band(self, width: int) -> np.ndarray:
@@ -46,12 +37,13 @@ class SurfaceRegion:
 
 
 def depth_gate(plane: PlaneEstimate) -> float:
-    """Share of depth within which a reading is on the surface."""
+    """Fraction of depth within which a reading is on the surface."""
     return min(max(_GATE_SIGMAS * plane.residual_sigma, _GATE_LOW), _GATE_HIGH)
 
 
-def samples_on(grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, seed: tuple[int, int] | None) -> np.ndarray:
-    """Connected samples on a plane by depth alone, bool (rows, columns); ``inverse`` is their 1/Z, 0 where absent."""
+def samples_on(samples: Samples, plane: PlaneEstimate, seed: tuple[int, int]) -> np.ndarray:
+    """Connected samples on a plane by depth alone, bool (rows, columns)."""
+    grid, inverse = samples.grid, samples.inverse
     predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
     relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
     cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
@@ -75,8 +67,7 @@ def filled(region: np.ndarray) -> np.ndarray:
     return np.maximum(filled, closed)
 
 
-def alike_colors(colors: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """Whether colours uint8 (..., 3) are one colour (3,) in some light, bool (...)."""
-    found = np.empty(colors.shape[:-1], np.uint8)
-    alike(np.ascontiguousarray(colors, float).reshape(-1, 3), np.ascontiguousarray(color, float), found.reshape(-1))
-    return found.view(bool)
+def connected(region: np.ndarray, grid: CoarseGrid, seed: tuple[int, int]) -> np.ndarray:
+    """The part of a region of samples that hangs together with a seed, gaps of one sample bridged."""
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    return connected_samples(closed, grid, seed) & region

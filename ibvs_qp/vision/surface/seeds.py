@@ -71,46 +71,26 @@ def _free_cells(
     steps: tuple[float, ...],
     directions: tuple[tuple[int, int], ...],
 ) -> list[tuple[int, int]]:
-    rows, columns = grid.shape
-    found = []
-    for step in steps:
-        for across, down in directions:
-            cell = grid.cell(center[0] + step * across * radius, center[1] + step * down * radius)
-            if 0 <= cell[0] < rows and 0 <= cell[1] < columns and grid.free[cell]:
-                found.append(cell)
-    return found
+    """Cells at steps of a radius from a normalised place that nothing hides, those of the first step first."""
+    fx, fy, cx, cy = grid.intrinsics
+    x, y = (c + np.multiply.outer(steps, way) * radius for c, way in zip(center, np.transpose(directions), strict=True))
+    rows, columns, inside = grid.cells_at(fx * x + cx, fy * y + cy)
+    free = inside & grid.free[rows, columns]
+    return list(zip(rows[free].tolist(), columns[free].tolist(), strict=True))
 
 
 def facing(grid: CoarseGrid, depth: np.ndarray, ladder: list[Seeds], config: PlaneConfig) -> list[tuple[int, int]]:
-    """The seeds at which a picture has the depth for which they were laid; without any, those of a contact.
-
-    Args:
-        grid: Where samples lie.
-        depth: Depth [m], (H, W).
-        ladder: From `seeds_ahead`.
-        config: Range of the depth, and the window of a seed.
-    """
+    """The seeds at which a picture has the depth for which they were laid; without any, those of a contact."""
     if not ladder:
         return []
-    inverse, gate = grid.inverse_depth(depth, config.distance_min_m, config.distance_max_m), math.sqrt(_RATIO)
-    found = {}  # no cell twice, in order
-    for seeds in ladder:
-        values = seed_values(grid, inverse, seeds.cells, config.seed_radius)
-        for cell, value in zip(seeds.cells, values, strict=True):
-            if 1.0 / gate < value * seeds.depth < gate:
-                found[cell] = None
-    return list(found) or ladder[0].cells
+    cells, gate = [(cell, seeds.depth) for seeds in ladder for cell in seeds.cells], math.sqrt(_RATIO)
+    values = seed_values(grid, grid.inverse_depth(depth, config), [cell for cell, _ in cells], config.seed_radius)
+    fitting = [cell for (cell, z), value in zip(cells, values, strict=True) if 1.0 / gate < value * z < gate]
+    return list(dict.fromkeys(fitting)) or ladder[0].cells  # no cell twice, in order
 
 
 def seed_values(grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> list[float]:
-    """Upper median 1/Z around every seed [1/m], 0 where too few samples have one.
-
-    Args:
-        grid: Where the samples lie.
-        inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
-        seeds: Cells.
-        radius: Half width of the window around a seed [cells].
-    """
+    """Upper median 1/Z around every seed [1/m], within a radius [cells]; 0 where too few samples have one."""
     if not seeds:
         return []
     windows, least = grid.windows(seeds, radius), 2 * radius + 1

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SurfaceColors
-from ibvs_qp.vision.kernels.colors import light_of
-from ibvs_qp.vision.kernels.labels import UNKNOWN
+from ibvs_qp.vision.appearance.light import light_of
 from ibvs_qp.vision.picture.grid import CoarseGrid
 
 GATE, WHITE, RED = 42.0, (200, 204, 196), (180, 40, 50)
@@ -81,19 +80,19 @@ def test_paint_is_learned_in_the_light_that_falls_on_it(grid: CoarseGrid, light:
 
 
 def test_light_is_even_where_all_that_has_the_tint_has_the_colour(grid: CoarseGrid) -> None:
-    colors, places = noisy(WHITE, grid.shape), np.arange(grid.shape[0] * grid.shape[1])
-    surface = SurfaceColors(WHITE, RED, GATE)
+    colors, (board, paint) = noisy(WHITE, grid.shape), (np.array(color, np.float32) for color in (WHITE, RED))
     colors[:5] = RED  # another tint
-    assert surface.surely_even(colors, places)
+    _, _, tinted, even = light_of(colors.reshape(-1, 3).astype(np.float32), board, paint, GATE)
+    assert tinted.sum() == even.sum() == colors[5:].size // 3
     colors[20:] = (0.7 * colors[20:]).astype(np.uint8)
-    assert not surface.surely_even(colors, places)
-    assert not SurfaceColors(None, RED, GATE).surely_even(colors, places)
+    _, _, tinted, even = light_of(colors.reshape(-1, 3).astype(np.float32), board, paint, GATE)
+    assert tinted.sum() == colors[5:].size // 3 and even.sum() == colors[5:20].size // 3
 
 
 def test_light_of_a_sample_is_its_share_of_the_board() -> None:
     board = np.array(WHITE, np.float32)
     samples = np.array([board, 0.5 * board, 0.3 * board, (252, 0, 0), RED, 0.95 * board], np.float32)
-    light, cut, tinted, even = light_of(samples, board, UNKNOWN, GATE)
+    light, cut, tinted, even = light_of(samples, board, None, GATE)
     np.testing.assert_allclose(light[[0, 1, 2, 5]], (1.0, 0.5, 0.3, 0.95), rtol=1e-6)
     assert cut.tolist() == [False, False, False, True, False, False]
     assert tinted.tolist() == [True, True, False, True, False, True]

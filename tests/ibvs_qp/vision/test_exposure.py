@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.kernels.brightness import brightness_ratio
-from ibvs_qp.vision.picture.exposure import ExposureSteps
+from ibvs_qp.vision.picture.exposure import ExposureSteps, brightness_ratio
 
 FRAME_NS = 33_000_000
 
@@ -54,10 +53,8 @@ def test_a_pause_or_another_size_starts_anew() -> None:
 
 
 def test_brightness_is_compared_on_unsaturated_pixels_only() -> None:
-    before = np.full((20, 30, 3), 100, np.uint8)
-    after = np.full((20, 30, 3), 121, np.uint8)
-    after[:, :20] = 255
-    assert brightness_ratio(before, after, 250) == pytest.approx(364.0 / 301.0)
-    after[:, :29] = 255  # less than a twentieth is left
-    after[1:] = 255
-    assert brightness_ratio(before, after, 250) == 1.0
+    before, after = np.full((3, 20, 30), 100, np.uint8), np.full((3, 20, 30), 121, np.uint8)
+    after[0, :, :20] = 255
+    assert brightness_ratio(before, after) == pytest.approx(364.0 / 301.0)
+    after[1, :, :29] = 255  # less than a twentieth is left
+    assert brightness_ratio(before, after) == 1.0

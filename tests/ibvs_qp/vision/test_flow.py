@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,20 +12,15 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.config import FlowConfig, MaskConfig, VisionConfig
-from ibvs_qp.vision.flow.solve_velocity import (
-    FlowSurface,
-    FlowVelocity,
-    expected_points,
-    information_root,
-    inverse_depths,
-    solve_velocity,
-)
-from ibvs_qp.vision.flow.sparse_flow import SparseFlow
+from ibvs_qp.vision.flow.motion import CameraMotion
+from ibvs_qp.vision.flow.sparse_flow import SparseFlow, expected_points, information_root, inverse_depths
+from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
 from ibvs_qp.vision.picture.mask import vehicle_mask
 from ibvs_qp.vision.surface.layout import PictureLayout
 
 FOCAL, INTERVAL, CONFIG = 150.0, 0.033, FlowConfig()
 INTRINSICS = (FOCAL, FOCAL, 79.5, 59.5)
+STILL = CameraMotion(np.eye(3), np.zeros(3), np.zeros(3))
 
 
 def test_roots_are_those_of_the_structure_tensor_less_noise() -> None:
@@ -50,7 +47,8 @@ def test_depth_of_a_point_is_the_surfaces_or_the_median_around_it() -> None:
     depth = np.full((120, 160), 2.0, np.float32)
     depth[:60:2], depth[80:, :80], depth[80:, 80:] = 0.0, np.nan, 1.0
     at = np.array([[40.0, 71.0], [40.0, 20.0], [20.0, 100.0], [120.0, 100.0], [np.nan, 1e30]])
-    bearings, surface = (at - INTRINSICS[2:]) / FOCAL, FlowSurface(np.array([0.0, 0.0, 0.51]), 0.01)
+    bearings = (at - INTRINSICS[2:]) / FOCAL
+    surface = SimpleNamespace(inverse_depth=np.array([0.0, 0.0, 0.51]), residual_sigma=0.01)
     assert inverse_depths(bearings[:4], depth, INTRINSICS, None).tolist() == [0.5, 0.0, 0.0, 1.0]
     assert inverse_depths(bearings, depth, INTRINSICS, surface)[:4].tolist() == [0.51, 0.0, 0.0, 1.0]
 
@@ -101,23 +99,14 @@ def test_weak_texture_is_followed_beside_a_strong_corner(texture: float, screw: 
     board = cv2.GaussianBlur(rng.standard_normal((480, 900)), (0, 0), 6.0)
     board = 200.0 + texture * board / board.std()
     cv2.circle(board, (400, 240), 7, screw, -1)
-    flow, found = SparseFlow(CONFIG), []
+    flow, found = SparseFlow(CONFIG, np.zeros(3)), []
     for number in range(20):
         shift = np.array([[1.0, 0.0, -number * INTERVAL * speed / depth_m * focal], [0.0, 1.0, 0.0]])
         grey = cv2.warpAffine(board, shift, (640, 480), flags=cv2.INTER_CUBIC) + rng.normal(0.0, 2.0, (480, 640))
         rgb = np.repeat(np.clip(np.rint(grey), 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
-        result = flow.update(
-            rgb,
-            np.full((480, 640), depth_m, np.float32),
-            np.zeros((240, 320), np.uint8),
-            (focal, focal, 319.5, 239.5),
-            round((1 + number) * INTERVAL * 1e9),
-            np.zeros(3),
-            np.eye(3),
-            None,
-            np.zeros(3),
-        )
-        found.append(result)
+        depth, stamp_ns = np.full((480, 640), depth_m, np.float32), round((1 + number) * INTERVAL * 1e9)
+        frame = RgbdFrame(rgb=rgb, depth=depth, intrinsics=(focal, focal, 319.5, 239.5), stamp_ns=stamp_ns)
+        found.append(flow.update(frame, np.zeros((240, 320), np.uint8), STILL, None))
     velocities = [R_BODY_CAMERA.T @ each.velocity for each in found[1:] if isinstance(each, FlowVelocity)]
     if texture == 0.0:
         deviations = [np.sqrt(each.covariance[1, 1]) for each in found if isinstance(each, FlowVelocity)]
@@ -137,17 +126,14 @@ def test_the_edge_of_the_arm_is_not_taken_for_a_wall_that_stands_still() -> None
     wall[60:] = cv2.GaussianBlur(rng.normal(90.0, 1.0, (420, 1200)), (0, 0), 3.0)  # paint, up to a level edge
     arm = vehicle_mask(vehicle, config.brush_width_m, MaskConfig(margin_px=0.0), intrinsics, shape) > 0
     depth = np.full(shape, distance, np.float32)
-    flow, velocities = SparseFlow(config.flow), []
+    flow, velocities = SparseFlow(config.flow, np.array(vehicle.camera_position_m)), []
     for picture in range(12):
         grey = wall[:, picture * step : picture * step + shape[1]] + rng.normal(0.0, 2.0, shape)
         grey[arm] = 20.0
         rgb = np.repeat(grey.clip(0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
         frame = RgbdFrame(rgb=rgb, depth=depth, intrinsics=intrinsics, stamp_ns=picture * 33_000_000)
         excluded = PictureLayout(frame, config, vehicle).excluded
-        camera = np.array(vehicle.camera_position_m)
-        found = flow.update(
-            rgb, depth, excluded, intrinsics, frame.stamp_ns, np.zeros(3), np.eye(3), None, camera
-        )  # fmt: skip
+        found = flow.update(frame, excluded, STILL, None)
         if picture:
             assert isinstance(found, FlowVelocity)
             velocities.append((R_BODY_CAMERA.T @ found.velocity)[0])

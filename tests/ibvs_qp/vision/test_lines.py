@@ -13,10 +13,8 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines.query import LineQuery
-from ibvs_qp.vision.lines.refine_lines import refine_lines
-from ibvs_qp.vision.lines.track import Track
-from ibvs_qp.vision.lines.tracks import LineTracker
+from ibvs_qp.vision.lines.refine import LineQuery, refine_lines
+from ibvs_qp.vision.lines.tracks import LineTracker, Track
 from ibvs_qp.vision.picture.picture import Picture
 
 FOCAL, SIZE = 600.0, (480, 640)

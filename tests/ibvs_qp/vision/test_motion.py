@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
-from ibvs_qp.vision.flow.camera_motion import CameraMotion
+from ibvs_qp.vision.flow.motion import CameraMotion
 
 CAMERA = np.array([0.2, 0.0, 0.08])
 

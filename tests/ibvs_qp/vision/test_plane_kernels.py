@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.kernels.hypotheses import judge_planes
-from ibvs_qp.vision.kernels.labels import BOARD, PAINT
-from ibvs_qp.vision.kernels.plane import choose_samples, fit_plane, residual_squares
-from ibvs_qp.vision.kernels.samples import sample_depths, sample_means
+from ibvs_qp.vision.appearance.labels import BOARD, PAINT
+from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.estimate import connected_samples
+from ibvs_qp.vision.surface.plane import choose_samples, connected_samples, fit_plane, residual_squares
+from ibvs_qp.vision.surface.search import score_planes
 
 PLANE, SHAPE = np.array([0.3, -0.2, 2.0]), (12, 20)
 
@@ -60,35 +59,33 @@ def test_colours_choose_where_they_are_enough(rng: np.random.Generator, own_dept
     np.testing.assert_array_equal(chosen, colored if least == 10 else near)
 
 
-def test_planes_are_judged_by_what_agrees(rng: np.random.Generator) -> None:
+def test_planes_are_scored_by_what_agrees(rng: np.random.Generator) -> None:
     design, inverse = samples(rng)
-    seed, pairs, judged = 110, rng.integers(0, len(inverse), (2, 30)), np.arange(0, len(inverse), 3)
+    seed, pairs, judges = 110, rng.integers(0, len(inverse), (2, 30)), np.arange(0, len(inverse), 3)
     pairs[:, 0] = 7  # no plane
-    planes, scores = judge_planes(design, inverse, seed, inverse[seed], pairs, judged, 0.015, 0.25, 1e-4)
-    weight = np.exp(-((design[judged] - design[seed]) ** 2).sum(axis=1) / 0.25**2)
+    planes, scores = score_planes(design, inverse, seed, inverse[seed], pairs, judges, 0.015, 0.25, 1e-4)
+    weight = np.exp(-((design[judges] - design[seed]) ** 2).sum(axis=1) / 0.25**2)
     np.testing.assert_allclose(planes @ design[seed], inverse[seed])
     np.testing.assert_array_equal(planes[0], (0.0, 0.0, inverse[seed]))
     one, two = (np.vecdot(planes, design[place]) - inverse[place] for place in pairs)
     spans = np.any(planes[:, :2] != 0.0, axis=1)
     np.testing.assert_allclose(np.abs(one[spans]) + np.abs(two[spans]), 0.0, atol=1e-9)
-    agrees = np.abs(planes @ design[judged].T - inverse[judged]) < 0.015 * inverse[judged]
+    agrees = np.abs(planes @ design[judges].T - inverse[judges]) < 0.015 * inverse[judges]
     np.testing.assert_allclose(scores, agrees @ weight)
 
 
 def test_depth_is_read_where_it_is_in_range(rng: np.random.Generator) -> None:
     depth = rng.uniform(0.5, 2.0, (30, 40)).astype(np.float32)
     depth[::5], depth[::7, ::2], depth[::4, ::3] = 0.0, np.nan, np.inf
-    v, u = np.mgrid[0:30:3, 0:40:3]
-    places = np.stack((u, v), axis=-1).reshape(-1, 2).astype(np.int16)
-    free, inverse = rng.random(len(places)) < 0.9, np.empty(len(places))
-    sample_depths(depth, places, 0.6, 1.9, inverse)
-    z = depth[v, u].ravel().astype(float)
-    np.testing.assert_array_equal(inverse, np.divide(1.0, z, out=np.zeros_like(z), where=(z > 0.6) & (z < 1.9)))
-    sample_means(depth, places, free, 0.6, 1.9, inverse)
-    left, above = np.maximum(u - 1, 0), np.maximum(v - 1, 0)
-    z = np.mean([depth[r, c].ravel().astype(float) for r in (above, v) for c in (left, u)], axis=0)
-    good = free & (z > 0.6) & (z < 1.9)
-    np.testing.assert_allclose(inverse, np.divide(1.0, z, out=np.zeros_like(z), where=good), rtol=1e-6)
+    grid = CoarseGrid((30, 40), (40.0, 40.0, 19.5, 14.5), np.zeros((30, 40), np.uint8), 20)
+    config = PlaneConfig(distance_min_m=0.6, distance_max_m=1.9)
+    v, u = np.mgrid[1:30:2, 1:40:2]
+    z = depth[v, u].astype(float)
+    wanted = np.divide(1.0, z, out=np.zeros_like(z), where=(z > 0.6) & (z < 1.9))
+    np.testing.assert_array_equal(grid.inverse_depth(depth, config), wanted)
+    z = np.mean([depth[r, c].astype(float) for r in (v - 1, v) for c in (u - 1, u)], axis=0)
+    wanted = np.divide(1.0, z, out=np.zeros_like(z), where=(z > 0.6) & (z < 1.9))
+    np.testing.assert_allclose(grid.mean_inverse_depth(depth, config), wanted, rtol=1e-6)
 
 
 def test_hidden_samples_connect_the_surface() -> None:

@@ -11,9 +11,7 @@ import pytest
 
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines.query import LineQuery
-from ibvs_qp.vision.lines.refine_lines import refine_lines
-from ibvs_qp.vision.lines.refined import RefinedLine
+from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
 from ibvs_qp.vision.picture.picture import Picture
 
 SIZE, INTRINSICS = (480, 640), (600.0, 480.0, 319.5, 239.5)

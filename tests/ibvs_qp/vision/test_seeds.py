@@ -21,7 +21,7 @@ def test_seeds_of_a_contact_lie_beside_the_brush() -> None:
     grid = grid_of()
     cells = seeds_ahead(grid, VehicleParams(), BRUSH_M)[0].cells
     rows = [row for row, _ in cells]
-    assert len(cells) == 8 and max(rows) == grid.cell_at(320, 140)[0]
+    assert len(cells) == 8 and max(rows) == grid.cells_at(320, 140)[0]
 
 
 def test_with_everything_beside_the_brush_hidden_the_surface_is_looked_for_below() -> None:
@@ -37,7 +37,8 @@ def test_seeds_follow_the_place_where_the_tip_will_meet_the_surface(depth: float
     grid = grid_of()
     ladder = seeds_ahead(grid, VehicleParams(), BRUSH_M)
     cells = facing(grid, np.full(SHAPE, depth, np.float32), ladder, PlaneConfig())
-    row, column = grid.cell(-1.7 * 0.5 * BRUSH_M / depth, -0.08 / depth)  # the tip is 0.08 m above the camera
+    x, y = -1.7 * 0.5 * BRUSH_M / depth, -0.08 / depth  # the tip is 0.08 m above the camera
+    row, column, _ = grid.cells_at(INTRINSICS[0] * x + INTRINSICS[2], INTRINSICS[1] * y + INTRINSICS[3])
     assert cells and abs(cells[0][0] - row) <= 1 and abs(cells[0][1] - column) <= 1
 
 
@@ -45,7 +46,7 @@ def test_the_first_seed_lies_inwards_of_the_corner_at_which_the_job_begins() -> 
     grid, tip = grid_of(), round(INTRINSICS[2])
     for right in (-1, 1):
         column = seeds_ahead(grid, VehicleParams(), BRUSH_M, (right, 1))[0].cells[0][1]
-        assert (column - grid.cell_at(tip, 0)[1]) * right > 0
+        assert (column - grid.cells_at(tip, 0)[1]) * right > 0
 
 
 def test_without_depth_at_any_distance_those_of_a_contact_remain() -> None:

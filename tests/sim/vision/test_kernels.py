@@ -10,8 +10,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import Perception, VisionConfig
-from ibvs_qp.vision.kernels import compile as compiling
-from ibvs_qp.vision.kernels import prepare
+from ibvs_qp.vision.compilation import KERNELS, prepare
 from ibvs_qp.vision.paper import PaperConfig, PaperPerception
 from ibvs_qp.vision.picture.camera import RgbdCamera
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
@@ -19,7 +18,7 @@ from sim.bench.mission import mission_shots
 
 
 def _signatures() -> dict[str, int]:
-    return {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in compiling.KERNELS}
+    return {kernel.py_func.__name__: len(kernel.signatures) for kernel, _ in KERNELS}
 
 
 def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:

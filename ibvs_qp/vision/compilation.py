@@ -1,0 +1,69 @@
+"""Inner loops of vision, compiled by numba: what OpenCV and NumPy do not offer, or only by many calls on small arrays.
+
+A kernel is one Python function with the types of its arguments. `prepare` compiles all of them, once: numba keeps the
+machine code beside the source, or in the user's cache folder where the package cannot be written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+log = logging.getLogger(__name__)
+
+#: Every kernel that was imported, with its signature.
+KERNELS: list[tuple[Any, Any]] = []
+#: Time of the last change of any file with a part of kernels: numba itself watches only the file of the kernel.
+_changed = [0.0]
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """A part of kernels, compiled with them for the types that they pass.
+
+    Fractions by zero are those of IEEE 754, sums keep their order, and products and sums are not contracted: all
+    processors give the same bits.
+    """
+    _changed[0] = max(_changed[0], Path(function.__code__.co_filename).stat().st_mtime)
+    return numba.njit(nogil=True, error_model="numpy")(function)
+
+
+def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function for one signature, at the latest when it is first called.
+
+    Args:
+        signature: Types of result and arguments, by numba's types or in its words, such as ``"i8(f8[:, ::1], u1)"``.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        compiled = inner(function)
+        with contextlib.suppress(RuntimeError):  # neither the package nor the user's cache folder can be written
+            compiled.enable_caching()
+        for index in _stored(compiled):
+            with contextlib.suppress(FileNotFoundError):  # another process was faster
+                if index.stat().st_mtime < _changed[0]:
+                    index.unlink()
+        KERNELS.append((compiled, signature))
+        return compiled
+
+    return decorate
+
+
+def prepare() -> None:
+    """Compile every imported kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
+    if not all(compiled.signatures or _stored(compiled) for compiled, _ in KERNELS):
+        log.warning("vision is compiled, once: up to 25 s")
+    for compiled, signature in KERNELS:
+        if not compiled.signatures:
+            compiled.compile(signature)
+
+
+def _stored(compiled: Any) -> list[Path]:
+    """Files that list the stored machine code of a kernel."""
+    folder, function = compiled.stats.cache_path, compiled.py_func
+    module = function.__module__.rpartition(".")[2]
+    return [] if folder is None else list(Path(folder).glob(f"{module}.{function.__name__}-*.nbi"))
