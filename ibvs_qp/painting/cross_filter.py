@@ -78,14 +78,9 @@ class CrossFilter:
             p[state, state] = deviation**2
 
     def predict(self, du: float, dv: float, dt: float, unled: bool, jumped: bool) -> None:
-        """The tip has moved by the odometer, in the axes of the strokes.
+        """The tip has moved by the odometer, in the axes of the strokes [m], within dt [s].
 
-        Args:
-            du: Along the strokes [m].
-            dv: Across them [m].
-            dt: Duration [s].
-            unled: Whether it moves without an edge.
-            jumped: Whether the odometer may be wrong by this move.
+        ``unled`` is a way without an edge; by a move that ``jumped`` the odometer may be wrong.
         """
         x, p = self.x, self.p
         kept, way = math.exp(-dt / WANDER_TIME_S), math.hypot(du, dv)

@@ -231,13 +231,9 @@ class CrossTrack:
         return shares
 
     def look(self, lines: Sequence[PatternLine], u: float, ahead: float, again: bool = False) -> None:
-        """Correct with every edge in view, once per `LOOK_S`.
+        """Correct with every edge in view, once per `LOOK_S`; the tip is at u and travels ahead along u, +-1.
 
-        Args:
-            lines: Lines in view.
-            u: Of the tip [m].
-            ahead: Direction of travel along u, +-1.
-            again: Whether the tip is on the paint of the stroke in progress, which hides the last one's edge.
+        ``again`` on the paint of the stroke in progress, which hides the last one's edge.
         """
         self._u, laying = u, bool(self.strokes.passes)
         self._forward = self._forward if again else ahead

@@ -26,8 +26,8 @@ class PatternLine:
         lean: Change of that coordinate per metre of the other one [-].
         side: Where the surface lies, for paint the bare one: +1 at larger coordinates, -1 at smaller ones, 0 unknown.
         scale: Offset of the line along its own normal per metre of place [-].
-        middle: Middle of the piece that the last frame shows, (u, v) from the tip [m]; NaN where unknown.
-        length: Length of that piece [m].
+        length: Length of the piece that the last frame shows [m].
+        middle: Middle of that piece, (u, v) from the tip [m]; NaN where unknown, and in a single `pattern_line`.
     """
 
     track: TrackedLine
@@ -36,8 +36,8 @@ class PatternLine:
     lean: float
     side: int
     scale: float
-    middle: tuple[float, float]
     length: float
+    middle: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def weight(self) -> float:
@@ -65,27 +65,24 @@ def pattern_line(line: TrackedLine, pattern: Pattern, turn: float) -> PatternLin
     scale, other = (across, along) if parallel else (along, across)
     if abs(scale) < _LEAST_COMPONENT:
         return None
-    c, s, offset = math.cos(line.seen_angle), math.sin(line.seen_angle), line.seen_offset
-    middle = pattern.to_pattern(offset * c - line.middle * s, offset * s + line.middle * c)
     side = line.surface_side if scale > 0.0 else -line.surface_side
-    place, lean = line.offset / scale, -other / scale
-    return PatternLine(line, parallel, place, lean, side, scale, turned(*middle, -turn), line.length)
+    return PatternLine(line, parallel, line.offset / scale, -other / scale, side, scale, line.length)
 
 
 def pattern_lines(lines: Iterable[TrackedLine], pattern: Pattern, turn: float) -> list[PatternLine]:
     """Those lines that have a weight and a direction of the pattern, as of `pattern_line`."""
-    found = [pattern_line(line, pattern, turn) for line in lines if line.weight > 0.0]
-    return [line for line in found if line is not None]
+    found = []
+    for track in lines:
+        if track.weight > 0.0 and (line := pattern_line(track, pattern, turn)) is not None:
+            c, s, offset = math.cos(track.seen_angle), math.sin(track.seen_angle), track.seen_offset
+            middle = pattern.to_pattern(offset * c - track.middle * s, offset * s + track.middle * c)
+            line.middle = turned(*middle, -turn)
+            found.append(line)
+    return found
 
 
 def surface_edges(lines: Iterable[PatternLine], parallel: bool, side: int = 1) -> list[PatternLine]:
-    """Edges of a surface and not of paint, along or across the strokes.
-
-    Args:
-        lines: All lines.
-        parallel: Whether they run along the strokes.
-        side: Where the surface lies: +1 at larger coordinates or unknown, -1 at smaller ones.
-    """
+    """Edges along or across the strokes, not of paint; the surface at larger coordinates or unknown, or at smaller."""
     edges = [line for line in lines if line.parallel == parallel and line.kind != "paint"]
     return [line for line in edges if (line.side < 0) == (side < 0)]
 

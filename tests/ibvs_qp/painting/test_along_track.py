@@ -22,7 +22,7 @@ def upright(track: int, place: float, side: int, kind: str = "board", weight: fl
     """A line across the strokes, beside the tip."""
     line = TrackedLine(track_id=track, role="vertical", slot=0, angle=0.0, deviation=1e-3, seen_ns=0)
     line.weight, line.kind = weight, kind
-    return PatternLine(line, False, place, 0.0, side, 1.0, (place, 0.0), 0.4)
+    return PatternLine(line, False, place, 0.0, side, 1.0, 0.4, (place, 0.0))
 
 
 def at_the_margin() -> AlongTrack:

@@ -25,7 +25,7 @@ def parallel(track: int, place: float, side: int, kind: str, middle_u: float = 0
     """A line along the strokes, beside the tip."""
     line = TrackedLine(track_id=track, role="horizontal", slot=0, angle=0.5 * math.pi, deviation=0.0, seen_ns=0)
     line.weight, line.kind = 1.0, kind
-    return PatternLine(line, True, place, 0.0, side, 1.0, (middle_u, place), length)
+    return PatternLine(line, True, place, 0.0, side, 1.0, length, (middle_u, place))
 
 
 class Strokes:
