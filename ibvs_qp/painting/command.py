@@ -1,13 +1,15 @@
-"""Input and output of a strategy at one tick."""
+"""Input and output of a strategy at one tick, and the controller's reference that follows from the output."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ibvs_qp.estimation.wall_motion import TrackedLine
+from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.measurement import HORIZONTAL, LineReference, Reference
 
 #: No tilt, no travel; one array for all commands.
 ZERO = np.zeros(2)
@@ -85,3 +87,28 @@ class ExpectedEdge:
     offset: float
     side: int
     ahead: int
+
+
+def image_reference(target: PaintingCommand, depth: float, tip_below: float, tip_right: float) -> Reference:
+    r"""Reference of a command; an offset l on the wall from the optical axis becomes :math:`\rho = l / d`.
+
+    Args:
+        target: The command.
+        depth: Camera to wall along the optical axis [m].
+        tip_below: Tip below the optical axis [m].
+        tip_right: Tip to the right of it [m].
+    """
+    lines = []
+    for line, offset in target.guides:
+        tip, theta = (tip_below, 0.5 * math.pi) if line.role == HORIZONTAL else (tip_right, 0.0)
+        lines.append(LineReference(rho=(offset + tip) / depth, theta=theta, role=line.role))
+    return Reference(
+        push_force=target.push,
+        standoff=target.standoff,
+        lines=tuple(lines),
+        velocity=target.velocity,
+        contact=target.contact,
+        tilt=target.tilt,
+        travel=target.travel,
+        trim=target.trim,
+    )

@@ -1,7 +1,7 @@
-"""Where the tip is in the pattern, where it should be, and the command that leads it there.
+"""Where the tip is in the pattern, where it should be now, and the command that leads it there.
 
 Everything is in pattern coordinates (u along the strokes, v across; `ibvs_qp.painting.pattern`). Where the tip is:
-`cross_track` and `along_track`; lines that lead there: `carrier`.
+`cross_track` and `along_track`.
 """
 
 from __future__ import annotations
@@ -10,220 +10,167 @@ import math
 
 import numpy as np
 
-from ibvs_qp.measurement import HORIZONTAL
-from ibvs_qp.painting.along_track import SIGMAS, AlongTrack
-from ibvs_qp.painting.carrier import Carrier
+from ibvs_qp.painting.along_track import AlongTrack
 from ibvs_qp.painting.command import ZERO, ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.cross_track import LOOK_S, CrossTrack
-from ibvs_qp.painting.pattern import FILL, FILL_REST_M, Pattern
-from ibvs_qp.painting.pattern_lines import PatternLine, pattern_lines
-from ibvs_qp.painting.phase_machine import PhaseMachine
+from ibvs_qp.painting.pattern import ROWS, Pattern, turned
+from ibvs_qp.painting.pattern_lines import (
+    CERTAIN_WEIGHT,
+    LOST_WEIGHT,
+    PatternLine,
+    nearest,
+    pattern_line,
+    pattern_lines,
+    surface_edges,
+)
 from ibvs_qp.painting.speed import approached, clipped
+from ibvs_qp.painting.stroke import Stroke
 
-#: The end of a stroke moves by at most this much so that its length is right [m]: less than half a length's tolerance.
-MOST_END_SHIFT_M = 0.004
-#: A stroke that begins farther from its place shows that the board is not as long as the job says [m].
-MOST_BEGIN_ERROR_M = 0.015
 #: An odometer that moves by more at once was corrected after a hole in the data, by the velocity at its end [m/s, m].
 MOST_SPEED_M_S, JUMP_M = 1.0, 0.005
+#: Phases in which all lines in view count at every tick, and phases on the way to the wall and there.
+_ALL_LINES, _AT_THE_WALL = ("start", "survey"), ("approach", "align", "press", "paint", "retouch", "climb")
 
 
-class Navigation(PhaseMachine):
-    """Both coordinates of the tip by odometer and lines, and their references; a subclass is the phases."""
+class Navigation:
+    """Both coordinates of the tip by odometer and lines, and their references.
 
-    _SLIDES = True  # whether a stroke follows the press
+    Attributes:
+        cross, along: Estimates of v and u.
+        lines: Lines in view at the last look, or at this tick where all lines count.
+        guide, mark: Lines along and across the strokes that lead the tip at this tick, None where none is in view.
+        u_reference, v_reference: Where the tip should be now [m].
+    """
 
     def __init__(self, config: PaintingConfig) -> None:
-        self.pattern = Pattern(config.pattern, config.start)
-        super().__init__(config)
-
-    def reset(self) -> None:
-        """As after construction."""
-        super().reset()
-        self._cross, self._along = CrossTrack(self.config), AlongTrack(self.config)
-        self._across_line, self._along_line = Carrier(), Carrier()
-        self._lines: list[PatternLine] = []
+        self._config, self.pattern = config, Pattern(config.pattern, config.start)
+        self.cross, self.along = CrossTrack(config), AlongTrack(config)
+        self.lines: list[PatternLine] = []
+        self.guide: PatternLine | None = None
+        self.mark: PatternLine | None = None
+        self.u_reference = self.v_reference = 0.0
         self._odometer: tuple[float, float] | None = None
         self._looked = -math.inf
-        self._u_reference = self._v_reference = 0.0  # where the tip should be now [m]
-        self._v_target = self.config.edge_margin_m  # where the stroke in progress belongs [m]
-        self._behind = 0.0  # paint of the stroke before its beginning, by a gust or a retouch [m]
 
-    def step(self, inputs: PainterInput) -> PaintingCommand:
-        """Advance by one tick."""
-        dt = 0.0 if math.isnan(self._last_time) else inputs.time_s - self._last_time
-        self._navigate(inputs, dt)
-        return super().step(inputs)
-
-    def _navigate(self, inputs: PainterInput, dt: float) -> None:
-        """Move both coordinates by the odometer and correct them with the lines in view."""
-        cross, along = self._cross, self._along
+    def update(self, inputs: PainterInput, dt: float, phase: str, stroke: Stroke) -> list[tuple[float, str, str]]:
+        """Move both coordinates by the odometer and correct them with the lines in view; returns entries of the log."""
+        cross, along, pattern, now = self.cross, self.along, self.pattern, inputs.time_s
         odometer = float(inputs.odometer[0]), float(inputs.odometer[1])
-        before, self._odometer = self._odometer or odometer, odometer
-        du, dv = self._turned(*self.pattern.to_pattern(odometer[0] - before[0], odometer[1] - before[1]), -cross.turn)
-        cross.predict(du, dv, dt)
-        along.predict(du)
-        if math.hypot(du, dv) > MOST_SPEED_M_S * dt + JUMP_M:
-            cross.doubt(dv)
-            along.doubt(du)
-        self._lines = lines = pattern_lines(inputs.lines.values(), self.pattern, cross.picture_turn)
-        again = self.phase == "retouch"
-        if self.phase == "paint" and inputs.in_contact:
+        last, self._odometer = self._odometer or odometer, odometer
+        moved = pattern.to_pattern(odometer[0] - last[0], odometer[1] - last[1])
+        du, dv = turned(*moved, -cross.filter.turn)
+        jumped = math.hypot(du, dv) > MOST_SPEED_M_S * dt + JUMP_M
+        cross.predict(du, dv, dt, jumped)
+        along.predict(du, jumped)
+        if inputs.in_contact and phase in ("paint", "retouch"):
             cross.lay(along.u)
-        if again and inputs.in_contact:
-            cross.lay_again(along.u)
-        if inputs.time_s - self._looked >= LOOK_S and self.phase != "start":
-            self._looked = inputs.time_s
-            cross.look(lines, along.u, self._view_direction(), again)
-            if along.known and (noticed := along.look(lines)):
-                self.log.append((inputs.time_s, "edge", noticed))
-        if self._across_line.update(lines, self._guides()) and self.phase != "start":
-            line = self._across_line.line
-            assert line is not None
-            text = f"track {line.track.track_id} at {line.track.offset * 1e3:+.1f} mm"
-            self.log.append((inputs.time_s, "guide", text))
-        self._along_line.update(lines, self._upright_tracks())
+        turn, events = cross.picture_turn, []
+        looks = now - self._looked >= LOOK_S and phase != "start"
+        if looks or phase in _ALL_LINES:
+            self.lines = pattern_lines(inputs.lines.values(), pattern, turn)
+        if looks:
+            self._looked = now
+            cross.look(self.lines, along.u, stroke.direction, phase == "retouch")
+            if along.known and (noticed := along.look(self.lines)):
+                events.append((now, "edge", noticed))
+        before = self.guide
+        self.guide = self._first_in_view(inputs, self._guides(phase, stroke.place), turn)
+        self.mark = self._first_in_view(inputs, self._marks(phase, stroke), turn)
+        if self.guide is not None and phase != "start":
+            line = self.guide.track
+            if before is None or before.track.track_id != line.track_id:
+                events.append((now, "guide", f"track {line.track_id} at {line.offset * 1e3:+.1f} mm"))
+        return events
 
-    def _upright_tracks(self) -> tuple[int, ...]:
-        """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
-        if self.phase == "survey":
-            return ()
-        goal = self._stroke_goal() if self.phase in ("paint", "retouch") else self._stroke_begin()
-        return (self._along.end,) if goal > 0.5 * self.config.stroke_m else (self._along.near,)
+    def _first_in_view(self, inputs: PainterInput, tracks: list[int], turn: float) -> PatternLine | None:
+        for track in tracks:
+            line = inputs.lines.get(track)
+            if line is not None and line.weight > LOST_WEIGHT:
+                if (found := pattern_line(line, self.pattern, turn)) is not None:
+                    return found
+        return None
 
-    def _guides(self) -> tuple[int, ...]:
+    def _guides(self, phase: str, place: float) -> list[int]:
         """Tracks of the edges along the strokes, best first; on the way to the wall and there, those that stay in view.
 
         Another one would hold the vehicle back: the view barrier keeps it in the picture.
         """
-        cross, reach = self._cross, self.config.guide_reach_m
-        if self.phase not in ("approach", "align", "press", "paint", "retouch", "climb"):
-            return tuple(cross.guides)
-        return tuple([track for track, v in cross.guides.items() if abs(v - self._v_target) < reach])
+        reach = self._config.guide_reach_m if phase in _AT_THE_WALL else math.inf
+        return [track for track, v in self.cross.guides.items() if abs(v - place) < reach]
 
-    def _view_direction(self) -> float:
-        """Direction of travel along u: the last stroke's edge is in view there, not under the brush."""
-        return self.pattern.travel(max(self.row, 1))
+    def _marks(self, phase: str, stroke: Stroke) -> list[int]:
+        """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
+        if phase == "survey":
+            return []
+        to_end = (stroke.travel > 0.0) == (phase in ("paint", "retouch"))
+        return [self.along.end if to_end else self.along.near]
 
-    @staticmethod
-    def _turned(u: float, v: float, angle: float) -> tuple[float, float]:
-        c, s = math.cos(angle), math.sin(angle)
-        return c * u - s * v, s * u + c * v
+    def starting_guide(self) -> PatternLine | None:
+        """The board's edge at which the pattern starts, with the surface on its inner side, where it is certain."""
+        gates, edges = self._config.gates, surface_edges(self.lines, parallel=True)
+        guide = nearest(edges, -self._config.edge_margin_m, gates.start_m)
+        if guide is None or guide.weight <= CERTAIN_WEIGHT or guide.track.deviation >= gates.start_deviation_m:
+            return None
+        return guide
 
-    # ------------------------------------------------------------------ places
+    def expected_edge(self, outwards: float, ahead: float) -> ExpectedEdge:
+        """An outer edge of paint that far from the tip across the strokes [m], in view in that direction along u."""
+        pattern, (at, other) = self.pattern, (1, 0) if self.pattern.kind == ROWS else (0, 1)
+        sign, place = pattern.across[at], outwards - self.cross.tip_error
+        return ExpectedEdge(pattern.guide_role, place * sign, int(sign), int(ahead * pattern.along[other]))
 
-    def _stroke_begin(self) -> float:
-        """Where the stroke in progress, or the first one, begins, u [m]."""
-        return self._along.begin if self.pattern.travel(max(self.row, 1)) > 0.0 else self.config.stroke_m
+    def hold(self) -> None:
+        """Where the tip is, is where it should be."""
+        self.u_reference, self.v_reference = self.along.u, self.cross.v
 
-    def _stroke_goal(self) -> float:
-        """Where the stroke in progress ends, u [m].
-
-        Half the error of its beginning is made up for there, and the paint that a gust laid before it.
-        """
-        goal = self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
-        error = self._along.began - self._stroke_begin()
-        if abs(error) > MOST_BEGIN_ERROR_M:
-            return goal
-        shift = 0.5 * error - self.pattern.travel(self.row) * self._behind
-        return goal + clipped(shift, -MOST_END_SHIFT_M, MOST_END_SHIFT_M)
-
-    def _place(self, stroke: int) -> float:
-        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the board's other edge."""
-        config = self.config
-        nominal = config.edge_margin_m + (stroke - 1) * config.pitch_m
-        if config.rows == FILL and not math.isnan(self._cross.far_edge):
-            last = self._cross.far_edge - config.edge_margin_m
-            return last if last < nominal + FILL_REST_M else nominal
-        return nominal
-
-    def _is_certain(self) -> bool:
-        """Whether three standard deviations of the place fit into half the overlap, or into `least_certainty_m`."""
-        return SIGMAS * self._cross.deviation < self._certain_m
-
-    @property
-    def _certain_m(self) -> float:
-        """Half the overlap, or what is certain at any overlap [m]; a stroke that errs by twice as much leaves a gap."""
-        return max(0.5 * self.config.overlap_m, self.config.least_certainty_m)
-
-    # ---------------------------------------------------------------- movement
-
-    def _move_to(self, u: float, v: float, dt: float) -> tuple[float, float]:
+    def move_to(self, u: float, v: float, dt: float) -> tuple[float, float]:
         """Move both references towards a place off the wall; returns their speeds [m/s]."""
-        config, last = self.config, (self._u_reference, self._v_reference)
-        self._u_reference = approached(last[0], u, config.survey_speed_m_s * dt)
-        self._climb_to(v, dt)
+        last = self.u_reference, self.v_reference
+        self.u_reference = approached(last[0], u, self._config.survey_speed_m_s * dt)
+        self.v_reference = approached(last[1], v, self._config.climb_speed_m_s * dt)
         if dt <= 0.0:
             return 0.0, 0.0
-        return (self._u_reference - last[0]) / dt, (self._v_reference - last[1]) / dt
+        return (self.u_reference - last[0]) / dt, (self.v_reference - last[1]) / dt
 
-    def _climb_to(self, v: float, dt: float) -> None:
-        self._v_reference = approached(self._v_reference, v, self.config.climb_speed_m_s * dt)
+    def slide_to(self, v: float, dt: float) -> None:
+        """Move the reference across the strokes on the wall."""
+        self.v_reference = approached(self.v_reference, v, self._config.guide_slide_m_s * dt)
 
-    def _slid(self, now: float, target: float, dt: float) -> float:
-        return approached(now, target, self.config.guide_slide_m_s * dt)
-
-    # ------------------------------------------------------------------- lines
-
-    def expected_edge(self) -> ExpectedEdge | None:
-        """The painted edge to look for: the last stroke's outer one, ahead; for stroke 1 its own, behind the brush.
-
-        Without `vision.paint_color`, perception finds edges of paint only where they are expected, and only an edge of
-        the stroke being laid shows where the picture has the tip.
-        """
-        first = self.row == 1 and self.phase == "paint"
-        if not first and (self.row < 2 or self.phase not in ("climb", "paint", "search")):
-            return None
-        pattern, cross = self.pattern, self._cross
-        ahead, across = pattern.along, pattern.across
-        travel = -pattern.travel(1) if first else pattern.travel(self.row)
-        outer = 0.5 * self.config.brush_width_m + (0.0 if first else self._place(self.row - 1) - cross.v)
-        place = outer - cross.tip_error
-        sign = across[1] if pattern.guide_role == HORIZONTAL else across[0]
-        direction = ahead[0] if pattern.guide_role == HORIZONTAL else ahead[1]
-        return ExpectedEdge(role=pattern.guide_role, offset=place * sign, side=int(sign), ahead=int(travel * direction))
-
-    # ----------------------------------------------------------------- command
-
-    def _command(
+    def command(
         self,
-        inputs: PainterInput,
         *,
         contact: bool,
         standoff: float = 0.0,
         guided: bool = True,
         hold: bool = False,
-        along: float = 0.0,
-        climb: float = 0.0,
         edge: bool = False,
+        speed: tuple[float, float] = (0.0, 0.0),
+        travel: float = 0.0,
     ) -> PaintingCommand:
-        """Command of the tick.
+        """Command of the tick; without a line in view, the odometer holds.
 
-        ``along`` and ``climb`` are speeds along u and v [m/s]; ``hold`` holds u at its reference, ``edge`` leads the
-        tip there by the edge at the end of the stroke. Without a line in view, the odometer holds.
+        ``guided`` holds v at its reference, ``hold`` u, ``edge`` u where the edge beside it is in view. ``speed`` is
+        that along u and v, ``travel`` that along u which is planned at this push [m/s].
         """
-        config, guides, u, v = self.config, [], along, climb
+        guides, (u, v) = [], speed
         if guided:
-            error = self._v_reference - self._cross.v
-            if (line := self._across_line.line) is not None:
-                guides.append((line.track, self._across_line.offset(error)))
+            error = self.v_reference - self.cross.v
+            if self.guide is not None:
+                guides.append((self.guide.track, self.guide.target(error)))
             else:
                 v += self._held(error)
         if hold or edge:
-            error = self._u_reference - self._along.u
-            if (line := self._along_line.line) is not None:
-                guides.append((line.track, self._along_line.offset(error)))
+            error = self.u_reference - self.along.u
+            if self.mark is not None:
+                guides.append((self.mark.track, self.mark.target(error)))
             elif hold:
                 u += self._held(error)
-        u, v = self._turned(u, v, self._cross.turn)
-        travel = ZERO
-        if contact and self._SLIDES:
-            way = config.speed_m_s * self._view_direction()
-            travel = np.array(self.pattern.to_wall(way, 0.0))
-        velocity = np.array(self.pattern.to_wall(u, v))
-        return PaintingCommand(contact, standoff, velocity, guides, config.push_n, ZERO, travel)
+        velocity = np.array(self.pattern.to_wall(*turned(u, v, self.cross.filter.turn)))
+        planned = np.array(self.pattern.to_wall(travel, 0.0)) if travel else ZERO
+        return PaintingCommand(contact, standoff, velocity, guides, self._config.push_n, ZERO, planned)
 
     def _held(self, error: float) -> float:
         """Speed that holds a place by the odometer [m/s]."""
-        return clipped(self.config.hold_gain * error, -self.config.hold_speed_m_s, self.config.hold_speed_m_s)
+        config = self._config
+        return clipped(config.hold_gain * error, -config.hold_speed_m_s, config.hold_speed_m_s)

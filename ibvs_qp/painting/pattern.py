@@ -58,7 +58,8 @@ class Pattern:
         """Where the board lies from its start corner, (right, down), +1 or -1 each."""
         return -1 if self.start.endswith("right") else 1, -1 if self.start.startswith("bottom") else 1
 
-    def travel(self, stroke: int) -> float:
+    @staticmethod
+    def travel(stroke: int) -> float:
         """Direction of a stroke along u: +1 for odd ones, -1 for even ones."""
         return 1.0 if stroke % 2 == 1 else -1.0
 
@@ -77,6 +78,12 @@ class Pattern:
         """From the start corner into the board: sideways, and up or down."""
         right, down = self.inwards
         return (float(right), 0.0), (0.0, float(down))
+
+
+def turned(u: float, v: float, angle: float) -> tuple[float, float]:
+    """(u, v) of a vector that is turned from u to v by an angle [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    return c * u - s * v, s * u + c * v
 
 
 def stroke_count(rows: int | str, extent_m: float, edge_margin_m: float, pitch_m: float) -> int:

@@ -32,7 +32,7 @@ class Presser(Painter):
     def reset(self) -> None:
         """As after construction."""
         super().reset()
-        self._touched = math.nan
+        self._touched = math.inf
 
     def expected_edge(self) -> ExpectedEdge | None:
         """None: a slide has one path and paints no stroke beside it."""
@@ -43,30 +43,26 @@ class Presser(Painter):
         self._give_up(inputs, reason)
 
     def _time_out(self, inputs: PainterInput) -> None:
-        if self.phase != "press" or math.isnan(self._touched):
+        if self.phase != "press" or math.isinf(self._touched):
             super()._time_out(inputs)
 
     def _begin_job(self, inputs: PainterInput, found: str) -> None:
         """A press begins at the margin from the edge beside it, or where the tip is."""
-        mark = self._starting_mark()
-        if mark is None:
-            self._along.start_here()
-        else:
-            self._along.start_at(mark)
-        self._u_reference = self._along.u
+        if not self._tip.along.find_mark(self._tip.lines):
+            self._tip.along.start_here()
         self._enter(inputs, "approach", found)
 
     def _press(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         self._hold_touch_point(inputs)
-        if math.isnan(self._touched) and inputs.in_contact:
-            self._touched = inputs.time_s
+        if inputs.in_contact:
+            self._touched = min(self._touched, inputs.time_s)
         if inputs.time_s - self._touched > self._hold_s:
             held = f"held for {self._hold_s:g} s"
-            if self._slide_s > 0.0:
-                self._begin_stroke(inputs, 1, f"{held}, sliding")
+            if self._SLIDES:
+                self._begin_stroke(inputs, f"{held}, sliding")
             else:
                 self._enter(inputs, "retreat", held)
-        return self._command(inputs, contact=True, hold=True)
+        return self._on_the_wall(hold=True)
 
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         self._pause_without_contact(inputs)
@@ -74,4 +70,4 @@ class Presser(Painter):
         self._speed = ramped(self._speed, target, self.config.acceleration_m_s2 * dt)
         if inputs.time_s - self.entered > self._slide_s:
             self._enter(inputs, "retreat", f"slid for {self._slide_s:g} s")
-        return self._command(inputs, contact=True, along=self._speed)
+        return self._on_the_wall(speed=(self._speed, 0.0))

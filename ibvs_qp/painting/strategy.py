@@ -73,8 +73,6 @@ class Strategy(ABC):
             The targets: push or stand-off, velocity along the wall, and lines to follow.
         """
 
-    # ----------------------------------------------------------- for subclasses
-
     def enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         """Begin a phase.
 
@@ -100,8 +98,6 @@ class Strategy(ABC):
         self.failed, self.reason, self._leaving = self.failed or failed, self.reason or reason, True
         self.enter(inputs, "retreat", reason)
         return self._away()
-
-    # ------------------------------------------------------------ for the pilot
 
     def fly(self, inputs: PainterInput) -> PaintingCommand:
         """Targets of one tick: those of `step`, or those of the way off the wall; never raises."""
@@ -139,8 +135,6 @@ class Strategy(ABC):
     def expected_edge(self) -> ExpectedEdge | None:
         """A painted edge that should come into view, for perception; None for no such edge."""
         return None
-
-    # ------------------------------------------------------------- off the wall
 
     def _give_up(self, inputs: PainterInput, reason: str) -> None:
         self.reason, self._given_up = reason, True

@@ -30,9 +30,8 @@ from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.painting.command import PainterInput, PaintingCommand, image_reference
 from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.reference import image_reference
 from ibvs_qp.painting.strategy import Strategy, require_strategy
 from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput

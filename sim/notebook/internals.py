@@ -37,7 +37,7 @@ class _PressAndSlide(Presser):
         return super().step(inputs)
 
     def _align(self, inputs: PainterInput, dt: float) -> PaintingCommand:
-        self._u_reference = self._along.u
+        self._tip.u_reference = self._tip.along.u
         self._enter(inputs, "press", "lines settle on the way")
         return super()._press(inputs, dt)
 

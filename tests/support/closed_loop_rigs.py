@@ -46,7 +46,7 @@ class HoldPainter(Painter):
     def _paint(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         if inputs.time_s - self.entered > self._hold_s:
             self._enter(inputs, "retreat", "held")
-        return self._command(inputs, contact=True, hold=True)
+        return self._on_the_wall(hold=True)
 
 
 def hold(scene: Scene, law: str, hold_s: float, seed: int = 0) -> dict[str, np.ndarray]:

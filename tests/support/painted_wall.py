@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,9 +35,28 @@ GUIDE, NEAR, END, FAR, OUTER, INNER = 1, 2, 3, 4, 100, 200
 GUIDE_GAIN, TIP_SPEED_MAX = 4.0, 0.15
 
 
-def short(**changes: object) -> PaintingConfig:
+#: Largest error of a stroke's place and end [m].
+PLACE = 3e-3
+
+
+def short(**changes: Any) -> PaintingConfig:
     """A job with strokes of 0.5 m, everything else by default."""
-    return PaintingConfig(**({"stroke_m": 0.5} | changes))  # type: ignore[arg-type]
+    return PaintingConfig(**({"stroke_m": 0.5} | changes))
+
+
+def wall(**changes: Any) -> PaintedWall:
+    """A wall with a `short` job; settings of both by name."""
+    job = {name: changes.pop(name) for name in list(changes) if name in PaintingConfig.__dataclass_fields__}
+    return PaintedWall(short(**job), **changes)
+
+
+def flown(phase: str, stroke: int = 0, seconds: float = 0.0, **changes: Any) -> PaintedWall:
+    """A `wall` where that phase (of a stroke) has begun and lasted for a time."""
+    world = wall(**changes)
+    world.fly(250.0, until=phase, stroke=stroke)
+    assert world.painter.phase == phase, world.painter.reason
+    world.fly(seconds)
+    return world
 
 
 @dataclass
@@ -283,7 +303,7 @@ class PaintedWall:
         if before != "paint" and self.painter.phase == "paint":
             self.paint.append(Paint(self.config.stroke_m))
             if isinstance(self.painter, Painter):
-                self.begins.append((self.painter.row, self.painter._cross.deviation))
+                self.begins.append((self.painter.row, self.painter._tip.cross.deviation))
         self._move(command)
         return command
 
@@ -329,6 +349,24 @@ class PaintedWall:
                 break
         return commands
 
+    def jolt(self, u: float = 0.0, v: float = 0.0) -> None:
+        """Something moves the tip, and the odometer measures it [m]."""
+        self.tip = self.tip + np.array((u, v))
+        self.odometer = self.odometer + np.array(self.to_wall(u, v))
+
+    def paint_without_push(self, way: float) -> None:
+        """Go on without push over a way along the stroke [m]."""
+        before, self.push = self.tip[0], 0.0
+        while abs(self.tip[0] - before) < way:
+            self.step()
+        self.push = 5.0
+
+    def finish(self, seconds: float = 300.0) -> str:
+        """Fly to the end of the job; returns why it failed, or an empty text."""
+        self.fly(seconds)
+        assert self.painter.finished, self.painter.phase
+        return self.painter.reason if self.painter.failed else ""
+
     # ------------------------------------------------------------------- results
 
     def phases(self) -> list[str]:
@@ -365,23 +403,19 @@ def clip(
     )
 
 
-#: Largest error of a stroke's place and end [m].
-PLACE = 3e-3
+def assert_painted(world: PaintedWall) -> None:
+    """The job is claimed, and every stroke lies at its place."""
+    assert world.finish() == ""
+    assert abs(world.place_errors()).max() < PLACE
 
 
-def started(right: float, down: float, **changes: object) -> PaintedWall:
+def started(right: float, down: float, **changes: Any) -> PaintedWall:
     """A job of one stroke that starts that far along u and v from where stroke 1 begins [m]."""
-    world = PaintedWall(short(**({"rows": 1} | changes)))
-    world.tip = world.tip + np.array((right, down))
-    return world
+    return wall(**({"rows": 1, "tip": np.array((right, 0.05 + down))} | changes))
 
 
 def assert_started_well(world: PaintedWall) -> None:
-    """A job of one stroke is finished, begins and ends where it should, and lies at its place."""
-    world.fly(150.0)
-    assert world.painter.finished and not world.painter.failed, world.painter.reason
-    path = world.paint[0]
-    painted = path.u[~(path.v != path.v)]
-    assert abs(world.place_errors()[0]) < PLACE
-    assert painted[0] == pytest.approx(0.0, abs=0.012)
+    """A job of one stroke is claimed, begins and ends where it should, and lies at its place."""
+    assert_painted(world)
+    assert world.paint[0].u[~np.isnan(world.paint[0].v)][0] == pytest.approx(0.0, abs=0.012)
     assert world.ends[0][1] == pytest.approx(world.config.stroke_m, abs=PLACE)

@@ -22,12 +22,12 @@ def upright(track: int, place: float, side: int, kind: str = "board", weight: fl
     """A line across the strokes, beside the tip."""
     line = TrackedLine(track_id=track, role="vertical", slot=0, angle=0.0, deviation=1e-3, seen_ns=0)
     line.weight, line.kind = weight, kind
-    return PatternLine(line, False, place, 0.0, side, 1.0, (place, 0.0), 0.4)
+    return PatternLine(line, False, place, 0.0, side, 1.0, 0.4, (place, 0.0))
 
 
 def at_the_margin() -> AlongTrack:
     along = AlongTrack(CONFIG)
-    along.start_at(upright(2, -MARGIN, 1))
+    assert along.find_mark([upright(2, -MARGIN, 1)])
     return along
 
 
@@ -45,7 +45,7 @@ def test_the_odometer_moves_u_and_its_variance_grows_with_the_way() -> None:
 def test_the_beginning_is_at_the_margin_from_the_edge_beside_it() -> None:
     along = AlongTrack(CONFIG)
     assert not along.known
-    along.start_at(upright(2, -0.07, 1))  # the tip is 2 cm too far
+    assert along.find_mark([upright(2, -0.07, 1)])  # the tip is 2 cm too far
     assert along.known and along.u == pytest.approx(0.02)
 
 
@@ -120,7 +120,7 @@ def test_another_origin_moves_the_whole_pass_and_a_jump_only_what_follows() -> N
     for tick in range(90):
         jumped.predict(0.01)
         if tick == 60:
-            jumped.doubt(0.03)
+            jumped._add_variance(0.03**2)
         jumped.look([])
     for _ in range(20):
         jumped.look([upright(3, END_U - 0.9 - 0.02, -1)])
@@ -185,7 +185,7 @@ def test_a_certain_edge_of_the_board_shows_that_the_odometer_has_erred(error: fl
     assert along.u == pytest.approx(true, abs=1e-3) and along.stroke_length == pytest.approx(
         0.9 + (-error if back else error), abs=5e-3
     )
-    assert along._x[1] == pytest.approx(-MARGIN, abs=1e-3) and (along.near == 2) == back
+    assert along._near_u == pytest.approx(-MARGIN, abs=1e-3) and (along.near == 2) == back
     assert along.slip == pytest.approx(abs(error))
     along.begin_stroke()
     assert along.slip == 0.0
@@ -202,7 +202,7 @@ def test_an_error_of_the_odometer_before_the_first_sight_of_the_end_leaves_no_co
     along.predict(-0.9)
     noticed = [along.look([upright(2, -MARGIN - slip, 1)]) for _ in range(9)]
     assert not any(noticed) and along.u == pytest.approx(slip, abs=2e-3) and along.slip == 0.0
-    assert along._x[1] == pytest.approx(-MARGIN, abs=2e-3) and along.begin == pytest.approx(0.0, abs=2e-3)
+    assert along._near_u == pytest.approx(-MARGIN, abs=2e-3) and along.begin == pytest.approx(0.0, abs=2e-3)
 
 
 def test_a_far_edge_that_is_seen_badly_moves_nothing() -> None:
@@ -224,7 +224,16 @@ def test_an_edge_that_leaves_the_picture_does_not_move_the_beginning(weight: flo
     along.look([upright(2, -MARGIN - 0.22 + error, 1, weight=weight)])
     along.predict(-0.22)
     along.look([upright(2, -MARGIN, 1)])
-    assert along.u == pytest.approx(0.0, abs=2e-3) and along._x[1] == pytest.approx(-MARGIN, abs=2e-3)
+    assert along.u == pytest.approx(0.0, abs=2e-3) and along._near_u == pytest.approx(-MARGIN, abs=2e-3)
+
+
+def test_the_edge_beside_the_beginning_that_comes_into_view_later_is_as_uncertain_as_u() -> None:
+    along = AlongTrack(CONFIG)
+    along.find_end([upright(3, 0.2, -1)])
+    along.predict(-0.8)
+    for _ in range(2):
+        along.look([upright(2, -MARGIN - along.u + 0.1, 1)])
+        assert np.linalg.eigvalsh(along._p).min() >= -1e-18
 
 
 def test_back_at_the_beginning_the_edge_beside_it_corrects() -> None:
@@ -246,7 +255,7 @@ def test_the_error_of_u_is_as_large_as_the_filter_says() -> None:
         rng = np.random.default_rng(seed)
         place = 0.0
         along = AlongTrack(CONFIG)
-        along.start_at(upright(2, -MARGIN + EDGE_STD * rng.standard_normal(), 1))
+        along.find_mark([upright(2, -MARGIN + EDGE_STD * rng.standard_normal(), 1)])
         for du in [0.01] * 100 + [-0.01] * 100:
             place += du
             along.predict(du + math.sqrt(DRIFT_PER_M * abs(du)) * rng.standard_normal())

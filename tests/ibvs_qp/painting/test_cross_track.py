@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
-from ibvs_qp.painting import cross_track
+from ibvs_qp.painting import cross_filter, cross_track
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.cross_track import LOOK_S, CrossTrack
 from ibvs_qp.painting.pattern_lines import PatternLine
@@ -25,7 +25,7 @@ def parallel(track: int, place: float, side: int, kind: str, middle_u: float = 0
     """A line along the strokes, beside the tip."""
     line = TrackedLine(track_id=track, role="horizontal", slot=0, angle=0.5 * math.pi, deviation=0.0, seen_ns=0)
     line.weight, line.kind = 1.0, kind
-    return PatternLine(line, True, place, 0.0, side, 1.0, (middle_u, place), length)
+    return PatternLine(line, True, place, 0.0, side, 1.0, length, (middle_u, place))
 
 
 class Strokes:
@@ -34,12 +34,12 @@ class Strokes:
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
         self.cross = CrossTrack(CONFIG)
-        self.u, self.v, self.delta = 0.0, MARGIN, cross_track.TIP_STD * self.rng.standard_normal()
-        self.drift = cross_track.DRIFT_STD * self.rng.standard_normal()
-        self.turn = cross_track.TURN_STD * self.rng.standard_normal()
-        self.wander = cross_track.WANDER_STD * self.rng.standard_normal()  # of odometer and picture
+        self.u, self.v, self.delta = 0.0, MARGIN, cross_filter.TIP_STD * self.rng.standard_normal()
+        self.drift = cross_filter.DRIFT_STD * self.rng.standard_normal()
+        self.turn = cross_filter.TURN_STD * self.rng.standard_normal()
+        self.wander = cross_filter.WANDER_STD * self.rng.standard_normal()  # of odometer and picture
         self.strokes: list[dict[int, float]] = []
-        board = self.seen(1, 0.0, 1, "board", cross_track.BOARD_STD)
+        board = self.seen(1, 0.0, 1, "board", cross_filter.BOARD_STD)
         self.cross.start(board)
         self.ratios: list[float] = []
 
@@ -52,11 +52,11 @@ class Strokes:
         return line
 
     def move(self, du: float, dv: float, dt: float = LOOK_S) -> None:
-        variance = cross_track.ODOMETER_PER_M * math.hypot(du, dv) + cross_track.ODOMETER_AT_REST * dt
-        kept = math.exp(-dt / cross_track.WANDER_TIME_S)
+        variance = cross_filter.ODOMETER_PER_M * math.hypot(du, dv) + cross_filter.ODOMETER_AT_REST * dt
+        kept = math.exp(-dt / cross_filter.WANDER_TIME_S)
         self.wander *= kept
-        self.wander += math.sqrt(1.0 - kept**2) * cross_track.WANDER_STD * self.rng.standard_normal()
-        measured = dv + self.drift * dt + (self.turn + self.wander - self.cross.turn) * du
+        self.wander += math.sqrt(1.0 - kept**2) * cross_filter.WANDER_STD * self.rng.standard_normal()
+        measured = dv + self.drift * dt + (self.turn + self.wander - self.cross.filter.turn) * du
         measured += math.sqrt(variance) * self.rng.standard_normal()
         self.u, self.v = self.u + du, self.v + dv
         self.cross.predict(du, measured, dt)
@@ -67,7 +67,7 @@ class Strokes:
         found = []
         if len(self.strokes) < 3:
             still = math.sqrt(cross_track.BOARD_INDEPENDENT_S / LOOK_S)
-            found.append(self.seen(1, 0.0, 1, "board", cross_track.BOARD_STD * still))
+            found.append(self.seen(1, 0.0, 1, "board", cross_filter.BOARD_STD * still))
         complete = self.strokes[:-1] if laying else self.strokes
         for stroke, direction, sides in ((complete, ahead, (1,)), (self.strokes if laying else [], -ahead, (1, -1))):
             if not stroke:
@@ -105,7 +105,7 @@ class Strokes:
         return self.cross.v - self.v
 
     def expected(self) -> float:
-        return math.sqrt(self.cross._p[0, 0])
+        return math.sqrt(self.cross.filter.p[0, 0])
 
 
 def test_the_error_of_v_is_as_large_as_the_filter_says() -> None:
@@ -150,32 +150,32 @@ def test_rows_of_h_are_the_derivatives_of_the_places_in_the_picture(own: bool, m
 
     def expected(state: int, by: float) -> list[float]:
         seen.clear()
-        turned = by if state in (cross_track._TURN, cross_track._WANDER) else 0.0
-        cross._x[state] += by
+        turned = by if state in (cross_filter.TURN, cross_filter.WANDER) else 0.0
+        cross.filter.x[state] += by
         cross.look([replace(line, middle=(u, v - turned * u)) for line in lines for u, v in (line.middle,)], 0.3, -1.0)
-        cross._x[state] -= by
+        cross.filter.x[state] -= by
         return [level - float(x[0] + x[1]) - place for x, place, _, level in seen]
 
     def note(edges: list, _noise: float, _gate: float) -> None:
-        seen.extend((cross._x.copy(), *edge[1:4]) for edge in edges)
+        seen.extend((cross.filter.x.copy(), *edge[1:4]) for edge in edges)
 
     monkeypatch.setattr(cross, "_correct", note)
-    monkeypatch.setattr(cross, "_take_error", lambda: None)
+    monkeypatch.setattr(cross.filter, "take_error", lambda _nodes: None)
     expected(0, 0.0)
     rows = np.array([row for _, _, row, _ in seen])
     assert len(rows) >= 2 + own
-    slopes = [(np.array(expected(k, 1e-4)) - expected(k, -1e-4)) / 2e-4 for k in range(cross_track._STATES)]
+    slopes = [(np.array(expected(k, 1e-4)) - expected(k, -1e-4)) / 2e-4 for k in range(cross_filter.STATES)]
     np.testing.assert_allclose(rows, np.transpose(slopes), atol=1e-9)
 
 
 def _after_stroke_one(delta: float = 0.0) -> CrossTrack:
     """Stroke 1 is painted by an odometer without drift, the tip has climbed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cross_track, "WANDER_STD", 0.0)
+        patch.setattr(cross_filter, "WANDER_STD", 0.0)
         cross = CrossTrack(CONFIG)
         cross.start(parallel(1, -MARGIN - delta, 1, "board"))
-        for steady in (cross_track._DRIFT, cross_track._TURN):
-            cross._p[steady, steady] = 0.0
+        for steady in (cross_filter.DRIFT, cross_filter.TURN):
+            cross.filter.p[steady, steady] = 0.0
         cross.begin_stroke()
         for k in range(60):
             cross.lay(0.01 * k)
@@ -184,6 +184,15 @@ def _after_stroke_one(delta: float = 0.0) -> CrossTrack:
         cross.end_stroke()
         cross.predict(0.0, PITCH, 1.5)
     return cross
+
+
+def _lay(cross: CrossTrack, bins: int = 60) -> Iterator[tuple[int, float]]:
+    """Begin stroke 2 and lay it bin by bin, by the odometer; what the caller does follows the move: bin and its u."""
+    cross.begin_stroke()
+    for k in range(bins):
+        cross.lay(0.6 - 0.01 * k)
+        cross.predict(-0.01, 0.0, 0.1)
+        yield k, 0.6 - 0.01 * k
 
 
 def _look(cross: CrossTrack, *lines: PatternLine, u: float = 0.3, times: int = 20, ahead: float = -1.0) -> CrossTrack:
@@ -198,7 +207,7 @@ def fresh(error: float = 0.0, track: int = 101, side: int = 1, kind: str = "pain
 
 
 def test_the_fresh_edge_corrects_v_where_the_tip_s_place_in_the_picture_is_known(monkeypatch) -> None:
-    monkeypatch.setattr(cross_track, "TIP_STD", 1e-5)
+    monkeypatch.setattr(cross_filter, "TIP_STD", 1e-5)
     cross = _after_stroke_one()
     before = cross.deviation
     _look(cross, fresh(0.004), times=60)
@@ -270,9 +279,9 @@ def test_an_older_stroke_helps_where_the_last_one_is_missing() -> None:
         cross.lay(0.6 - 0.01 * k)
     cross.end_stroke()
     cross.predict(0.0, PITCH, 1.5)
-    before = cross._p[0, 0]
+    before = cross.filter.p[0, 0]
     _look(cross, parallel(101, HALF - 2.0 * PITCH - 0.002, 1, "paint", 0.14, 0.16), ahead=1.0)
-    assert cross._p[0, 0] < before and list(cross.guides) == [101]
+    assert cross.filter.p[0, 0] < before and list(cross.guides) == [101]
 
 
 def test_the_board_s_edge_turns_the_strokes_and_no_more_than_a_board_may() -> None:
@@ -281,7 +290,7 @@ def test_the_board_s_edge_turns_the_strokes_and_no_more_than_a_board_may() -> No
         edge = parallel(1, -MARGIN, 1, "board")
         edge.lean = lean
         cross.start(edge)
-        assert cross.turn == cross.picture_turn == pytest.approx(expected)
+        assert cross.filter.turn == cross.picture_turn == pytest.approx(expected)
 
 
 def test_the_direction_that_the_odometer_showed_outlasts_the_board_s_edge_in_the_picture() -> None:
@@ -292,10 +301,10 @@ def test_the_direction_that_the_odometer_showed_outlasts_the_board_s_edge_in_the
     cross.start(edge)
     for k in range(200):
         du = 0.01 if k < 100 else -0.01
-        cross.predict(du, -cross.turn * du, 0.1)  # the odometer moves along the strokes exactly
+        cross.predict(du, -cross.filter.turn * du, 0.1)  # the odometer moves along the strokes exactly
         edge.lean = roll - math.tan(cross.picture_turn)
         _look(cross, edge, u=0.01 * min(k, 200 - k), times=1, ahead=1.0)
-    assert abs(cross.turn) < 1.5e-3
+    assert abs(cross.filter.turn) < 1.5e-3
     assert cross.picture_turn == pytest.approx(roll, abs=1e-3)
 
 
@@ -303,28 +312,25 @@ def test_the_direction_that_the_odometer_showed_outlasts_the_board_s_edge_in_the
 def test_a_board_s_edge_across_the_strokes_shows_the_turn_of_the_picture(turned: float) -> None:
     """A picture that is turned from u to v by an angle shows an edge along v turned from v to -u by it."""
     cross = _after_stroke_one()
-    cross._p[cross_track._WANDER, cross_track._WANDER] = cross_track.WANDER_STD**2
-    before = cross._p[cross_track._WANDER, cross_track._WANDER]
+    cross.filter.p[cross_filter.WANDER, cross_filter.WANDER] = cross_filter.WANDER_STD**2
+    before = cross.filter.p[cross_filter.WANDER, cross_filter.WANDER]
     for _ in range(100):
         across = parallel(7, 0.2, 1, "board")
         across.parallel, across.lean = False, -math.tan(turned - cross.picture_turn)
         ends_of_paint = replace(across, lean=0.3, track=replace(across.track, kind="paint"))
         cross.look([across, ends_of_paint], 0.3, 1.0)
     assert cross.picture_turn == pytest.approx(turned, abs=0.6 * abs(turned))
-    assert cross._p[cross_track._WANDER, cross_track._WANDER] < 0.5 * before
+    assert cross.filter.p[cross_filter.WANDER, cross_filter.WANDER] < 0.5 * before
 
 
 def test_a_step_back_forgets_nothing_that_was_learnt_of_the_stroke_that_is_laid() -> None:
     cross = _after_stroke_one()
-    cross.begin_stroke()
-    for k in range(40):
-        cross.lay(0.6 - 0.01 * k)
-        cross.predict(-0.01, 0.0, 0.1)
-        _look(cross, fresh(0.003, middle=-0.14), u=0.6 - 0.01 * k, times=1)
-    laid = slice(cross_track._OWN.start + 10, cross_track._OWN.stop)  # 0.26 to 0.6 m
-    learnt = cross._x[laid].copy()
+    for _, u in _lay(cross, 40):
+        _look(cross, fresh(0.003, middle=-0.14), u=u, times=1)
+    laid = slice(cross_filter.OWN.start + 10, cross_filter.OWN.stop)  # 0.26 to 0.6 m
+    learnt = cross.filter.x[laid].copy()
     cross.look([], 0.4, -1.0)
-    np.testing.assert_array_equal(cross._x[laid], learnt)
+    np.testing.assert_array_equal(cross.filter.x[laid], learnt)
     assert np.all(learnt != 0.0)
 
 
@@ -374,11 +380,8 @@ def test_a_place_is_as_uncertain_as_the_last_edge_wanders_from_where_it_is_expec
     misfits, place = [], []
     for jolt, looks in ((0.0, 1), (3e-3, 1), (3e-3, 10)):
         cross = _after_stroke_one()
-        cross.begin_stroke()
-        for k in range(40):
-            cross.lay(0.6 - 0.01 * k)
-            cross.predict(-0.01, 0.0, 0.1)
-            _look(cross, fresh(jolt if k // looks % 2 else -jolt), u=0.6 - 0.01 * (k + 1), times=1)
+        for k, u in _lay(cross, 40):
+            _look(cross, fresh(jolt if k // looks % 2 else -jolt), u=u - 0.01, times=1)
         misfits.append(cross.misfit)
         place.append(cross.stroke_place(0.25, 0.6)[1])
     assert max(misfits[:2]) < 0.5e-3 and 1e-3 < misfits[2] < 3e-3
@@ -391,42 +394,42 @@ def test_the_wander_of_the_odometer_s_axes_is_followed_and_fades() -> None:
     cross.begin_stroke()
 
     def move() -> None:
-        turned = wander - cross.turn  # the odometer in the axes of the strokes, as the filter has them
+        turned = wander - cross.filter.turn  # the odometer in the axes of the strokes, as the filter has them
         cross.predict(-0.01 * math.cos(turned), -0.01 * math.sin(turned), 0.1)
 
     for k in range(40):
         cross.lay(0.6 - 0.01 * k)
         move()
         _look(cross, fresh(), u=0.6 - 0.01 * (k + 1), times=1)
-    assert 0.25 * wander < cross.turn < wander
-    before, learnt = cross.v, cross.turn
+    assert 0.25 * wander < cross.filter.turn < wander
+    before, learnt = cross.v, cross.filter.turn
     for _ in range(20):
         move()
     assert abs(cross.v - before) < 0.8 * 0.2 * wander
     cross.predict(0.0, 0.0, 30.0)
-    assert abs(cross.turn) < 0.5 * learnt
+    assert abs(cross.filter.turn) < 0.5 * learnt
 
 
 def test_the_drift_of_the_odometer_makes_v_uncertain_in_one_direction() -> None:
     """Its variance in v grows with the square of time, and v and drift are correlated."""
     cross, seconds = CrossTrack(CONFIG), 20.0
     cross.start(parallel(1, -MARGIN, 1, "board"))
-    before = cross._p[0, 0]
+    before = cross.filter.p[0, 0]
     for _ in range(200):
         cross.predict(0.0, 0.0, 0.1)
-    variance = cross_track.DRIFT_STD**2
-    assert cross._p[0, cross_track._DRIFT] == pytest.approx(-seconds * variance, rel=0.1)
-    rest = cross_track.ODOMETER_AT_REST * seconds
-    assert cross._p[0, 0] - before == pytest.approx(seconds**2 * variance + rest, rel=0.1)
-    np.testing.assert_allclose(cross._p, cross._p.T, atol=1e-18)
+    variance = cross_filter.DRIFT_STD**2
+    assert cross.filter.p[0, cross_filter.DRIFT] == pytest.approx(-seconds * variance, rel=0.1)
+    rest = cross_filter.ODOMETER_AT_REST * seconds
+    assert cross.filter.p[0, 0] - before == pytest.approx(seconds**2 * variance + rest, rel=0.1)
+    np.testing.assert_allclose(cross.filter.p, cross.filter.p.T, atol=1e-18)
 
 
 def test_a_map_that_begins_has_the_error_of_v() -> None:
     cross = _after_stroke_one()
     cross.begin_stroke()
-    own = cross_track._OWN.start
-    np.testing.assert_array_equal(cross._p[own], cross._p[0])
-    assert cross._p[own, own] == cross._p[0, 0] > 0.0
+    own = cross_filter.OWN.start
+    np.testing.assert_array_equal(cross.filter.p[own], cross.filter.p[0])
+    assert cross.filter.p[own, own] == cross.filter.p[0, 0] > 0.0
 
 
 def _least(cross: CrossTrack, first_u: float, last_u: float) -> float:
@@ -435,8 +438,10 @@ def _least(cross: CrossTrack, first_u: float, last_u: float) -> float:
 
 
 def test_the_overlap_is_that_of_the_maps_and_their_errors() -> None:
-    cross = _after_stroke_one()
+    cross = CrossTrack(CONFIG)
+    cross.begin_stroke()
     assert cross.overlap(0.0, 0.6)[0].size == 0
+    cross = _after_stroke_one()
     cross.begin_stroke()
     for k in range(60):
         cross.lay(0.6 - 0.01 * k)
@@ -453,20 +458,17 @@ def test_the_overlap_is_that_of_the_maps_and_their_errors() -> None:
 
 def test_paint_laid_again_farther_in_adds_to_the_overlap_and_not_to_the_map() -> None:
     cross = _after_stroke_one()
-    cross.begin_stroke()
-    for k in range(60):
-        cross.lay(0.6 - 0.01 * k)
+    for _ in _lay(cross):
         cross.unled = 0.0  # as with the last stroke's edge in view
-        cross.predict(-0.01, 0.0, 0.1)
-    before, map_before = cross.overlap(0.0, 0.6), cross.maps[-1].places()[1]
+    before, map_before = cross.overlap(0.0, 0.6), cross.strokes.passes[0][0].places()[1]
     cross.predict(0.0, -0.004, 0.1)
     for way in (range(30), reversed(range(30))):  # the way back lies where the first pass does: it takes nothing away
         cross.begin_again()
         for k in way:
-            cross.lay_again(0.01 * k)
+            cross.lay(0.01 * k)
         cross.predict(0.0, 0.004, 0.1)
     u, overlap, _, largest = cross.overlap(0.0, 0.6)
-    np.testing.assert_array_equal(cross.maps[-1].places()[1], map_before)
+    np.testing.assert_array_equal(cross.strokes.passes[0][0].places()[1], map_before)
     again = u < 0.29
     assert np.all((overlap - before[1])[~again] == 0.0)
     gained = (overlap - before[1])[again]
@@ -488,7 +490,7 @@ def test_on_its_own_paint_the_edge_is_where_the_last_pass_left_it(middle: float)
     cross.predict(0.0, outwards, 0.1)
     cross.begin_again()
     for k in range(60):
-        cross.lay_again(0.01 * k)
+        cross.lay(0.01 * k)
     cross.predict(0.0, -outwards, 0.1)
     cross.begin_again()
     v = cross.v
@@ -507,7 +509,7 @@ def test_a_stroke_that_ends_elsewhere_than_the_odometer_says_moves_its_waves() -
         cross.predict(0.0, dip, 0.1)
     u, overlap, *_ = cross.overlap(0.0, 0.6)
     assert u[overlap > overlap.min() + 0.005].mean() == pytest.approx(0.32, abs=0.006)
-    cross.end_pass(np.array([0.6, 0.0]), np.array([0.58, -0.02]))
+    cross.strokes.end_pass(np.array([0.6, 0.0]), np.array([0.58, -0.02]))
     u, overlap, *_ = cross.overlap(0.0, 0.6)
     assert u[overlap > overlap.min() + 0.005].mean() == pytest.approx(0.30, abs=0.006)
 
@@ -520,7 +522,7 @@ def test_on_its_own_paint_the_tip_goes_by_the_edge_on_either_side(middle: float)
     for k in range(60):
         cross.lay(0.6 - 0.01 * k)
         cross.look([], 0.6 - 0.01 * k, -1.0)
-    cross._x[cross_track._AHEAD] = beta = 1e-3
+    cross.filter.x[cross_filter.AHEAD] = beta = 1e-3
     seems = beta if middle < 0.0 else 0.0
     own, v = parallel(102, HALF + seems, 1, "paint", middle, 0.16), cross.v
     cross.look([own], 0.3, 1.0, again=True)
@@ -552,11 +554,8 @@ def test_the_way_without_an_edge_ends_at_one_that_corrects(line: str) -> None:
         "far": parallel(3, 0.3, -1, "board"),
     }[line]
     cross = _after_stroke_one()
-    cross.begin_stroke()
-    for k in range(40):
-        cross.lay(0.6 - 0.01 * k)
-        cross.predict(-0.01, 0.0, 0.1)
+    for k, u in _lay(cross, 40):
         if k >= 20:
-            cross.look([seen], 0.6 - 0.01 * k, -1.0)
+            cross.look([seen], u, -1.0)
     assert cross.unled == 0.0
     assert cross.longest_unled == pytest.approx(0.21 if line == "far" else 0.2)  # the first look only learns its place

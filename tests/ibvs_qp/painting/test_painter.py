@@ -7,14 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from painted_wall import END, END_PART, FAR, GUIDE, NEAR, PaintedWall, short
+from painted_wall import END, END_PART, FAR, GUIDE, NEAR, PLACE, PaintedWall, short, wall
 
-from ibvs_qp.painting.painter import LEAST_OVERLAP
 from ibvs_qp.painting.pattern import CORNERS, PATTERNS, stroke_count
+from ibvs_qp.painting.stroke import LEAST_OVERLAP
 
 ALL_PATTERNS = list(itertools.product(PATTERNS, CORNERS))
-#: Largest error of a stroke's place, and largest error of the place of the tip in the picture [m].
-PLACE, TIP_ERROR = 3e-3, 4e-3
+#: Largest error of the place of the tip in the picture [m].
+TIP_ERROR = 4e-3
 
 
 def paint(world: PaintedWall) -> PaintedWall:
@@ -46,18 +46,17 @@ def amplitude(world: PaintedWall, stroke: int, wave_m: float) -> float:
 @pytest.mark.parametrize(("kind", "start"), ALL_PATTERNS)
 def test_five_strokes_end_at_their_places(kind: str, start: str, delta: float) -> None:
     """Also where the picture shows the tip beside its place: the own paint tells, from stroke 2 on at the latest."""
-    world = paint(PaintedWall(short(rows=5, stroke_m=0.4, pattern=kind, start=start), delta=delta))
+    world = paint(wall(rows=5, stroke_m=0.4, pattern=kind, start=start, delta=delta))
     assert [stroke for stroke, _, _ in world.ends] == [1, 2, 3, 4, 5]
     assert_at_their_places(world, after=0 if delta == 0.0 else 1)
-    assert abs(world.painter._cross.tip_error - delta) < 0.5 * TIP_ERROR
+    assert abs(world.painter._tip.cross.tip_error - delta) < 0.5 * TIP_ERROR
 
 
 @pytest.mark.parametrize(("kind", "start"), ALL_PATTERNS)
 def test_eight_strokes_end_at_their_places(kind: str, start: str) -> None:
     """The board's edge has left the picture by then: the error must not grow from stroke to stroke."""
     sign = 1.0 if start.startswith("top") else -1.0
-    config = short(rows=8, stroke_m=0.4, pattern=kind, start=start)
-    world = paint(PaintedWall(config, delta=sign * TIP_ERROR, noise=1e-3))
+    world = paint(wall(rows=8, stroke_m=0.4, pattern=kind, start=start, delta=sign * TIP_ERROR, noise=1e-3))
     assert_at_their_places(world, after=1)
 
 
@@ -73,7 +72,7 @@ FAST_OF_TWENTY = (("rows", "bottom-right", TIP_ERROR), ("rows", "top-left", -TIP
     ],
 )
 def test_twenty_strokes_end_at_their_places(kind: str, start: str, delta: float) -> None:
-    world = paint(PaintedWall(short(rows=20, stroke_m=0.8, pattern=kind, start=start), delta=delta))
+    world = paint(wall(rows=20, stroke_m=0.8, pattern=kind, start=start, delta=delta))
     assert len(world.ends) == 20
     assert_at_their_places(world, after=1)
 
@@ -84,18 +83,15 @@ def test_twenty_strokes_end_at_their_places(kind: str, start: str, delta: float)
 )
 def test_strokes_follow_a_sloped_board(kind: str, start: str, slope_deg: float) -> None:
     slope = math.radians(slope_deg)
-    world = PaintedWall(
-        short(rows=4, stroke_m=0.4, pattern=kind, start=start), slope=slope, delta=TIP_ERROR, noise=1e-3
-    )
+    world = wall(rows=4, stroke_m=0.4, pattern=kind, start=start, slope=slope, delta=TIP_ERROR, noise=1e-3)
     paint(world)
-    assert world.painter._cross.turn == pytest.approx(slope, abs=math.radians(0.2))
+    assert world.painter._tip.cross.filter.turn == pytest.approx(slope, abs=math.radians(0.2))
     assert_at_their_places(world, after=1)
 
 
 @pytest.mark.parametrize(("kind", "start"), [("rows", "top-right"), ("columns", "bottom-right")])
 def test_strokes_are_at_their_places_where_no_line_has_ends(kind: str, start: str) -> None:
-    config = short(rows=4, stroke_m=0.4, pattern=kind, start=start)
-    world = paint(PaintedWall(config, ends_seen=False, delta=-TIP_ERROR, noise=1e-3))
+    world = paint(wall(rows=4, stroke_m=0.4, pattern=kind, start=start, ends_seen=False, delta=-TIP_ERROR, noise=1e-3))
     assert_at_their_places(world, after=1)
 
 
@@ -112,7 +108,7 @@ def test_stroke_two_does_not_copy_the_waves_of_stroke_one(ends_seen: bool) -> No
     def wave(stroke: int, u: float) -> float:  # the guide takes half of it back
         return 5e-3 * math.sin(2.0 * math.pi * u / 0.25) if stroke == 1 else 0.0
 
-    world = paint(PaintedWall(short(rows=2, stroke_m=1.2), wave=wave, ends_seen=ends_seen))
+    world = paint(wall(rows=2, stroke_m=1.2, wave=wave, ends_seen=ends_seen))
     first = amplitude(world, 1, 0.25)
     assert first > 2.5e-3
     assert amplitude(world, 2, 0.25) < 0.1 * first
@@ -121,8 +117,8 @@ def test_stroke_two_does_not_copy_the_waves_of_stroke_one(ends_seen: bool) -> No
 @pytest.mark.parametrize("height", [0.25, 0.3, 0.316, 0.4])
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("rows", "top-left"), ("columns", "top-right")])
 def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str, height: float) -> None:
-    config = short(rows="fill", stroke_m=0.4, pattern=kind, start=start)
-    world = paint(PaintedWall(config, height=height))
+    world = paint(wall(rows="fill", stroke_m=0.4, pattern=kind, start=start, height=height))
+    config = world.config
     assert len(world.ends) == stroke_count("fill", height, config.edge_margin_m, config.pitch_m)
     assert_at_their_places(world, until=-1)
     before, last = (world.paint[k].straight(config.stroke_m).mean() for k in (-2, -1))
@@ -135,10 +131,10 @@ def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str,
 
 @pytest.mark.parametrize("drift", [1e-3, -1e-3])
 def test_a_job_begun_beside_its_beginning_begins_at_the_margin(drift: float) -> None:
-    world = paint(PaintedWall(short(rows=2, stroke_m=1.2), tip=np.array((0.2, 0.05)), drift=(drift, 0.0)))
+    world = paint(wall(rows=2, stroke_m=1.2, tip=np.array((0.2, 0.05)), drift=(drift, 0.0)))
     begin, end = world.reached
     assert begin == pytest.approx(0.0, abs=PLACE) and end == pytest.approx(1.2, abs=PLACE)
-    assert world.painter._along.deviation < 2e-3  # the job says where the edge beside the beginning lies
+    assert world.painter._tip.along.deviation < 2e-3  # the job says where the edge beside the beginning lies
 
 
 @pytest.mark.parametrize("at_margin", [True, False])
@@ -155,9 +151,9 @@ def test_a_board_longer_than_its_strokes_is_surveyed_unless_they_begin_at_the_ma
 
 
 def test_the_far_edge_in_view_changes_nothing_in_a_job_with_a_number_of_strokes() -> None:
-    world = PaintedWall(short(rows=4, stroke_m=0.4), height=0.5)
+    world = wall(rows=4, stroke_m=0.4, height=0.5)
     paint(world)
-    assert FAR not in (line.track_id for line, _ in world.command.guides) and world.painter._cross.far_edge < 0.51
+    assert FAR not in (line.track_id for line, _ in world.command.guides) and world.painter._tip.cross.far_edge < 0.51
     assert len(world.ends) == 4
     assert_at_their_places(world)
 
@@ -167,7 +163,7 @@ def test_the_far_edge_in_view_changes_nothing_in_a_job_with_a_number_of_strokes(
 
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_strokes_alternate_with_climbs(rows: int) -> None:
-    world = paint(PaintedWall(short(rows=rows)))
+    world = paint(wall(rows=rows))
     expected = ["approach", "align", "press"]
     for stroke in range(1, rows + 1):
         expected += ["paint"] + (["climb"] if stroke < rows else [])
@@ -175,7 +171,7 @@ def test_strokes_alternate_with_climbs(rows: int) -> None:
 
 
 def test_each_phase_change_is_logged_with_time_and_reason() -> None:
-    world = paint(PaintedWall(short(rows=2)))
+    world = paint(wall(rows=2))
     times = [time for time, _, _ in world.painter.log]
     assert times == sorted(times)
     reasons = {phase: reason for _, phase, reason in world.painter.log}
@@ -186,7 +182,7 @@ def test_each_phase_change_is_logged_with_time_and_reason() -> None:
 
 @pytest.mark.parametrize(("kind", "start"), ALL_PATTERNS)
 def test_strokes_and_climbs_go_into_the_board_at_their_speed(kind: str, start: str) -> None:
-    world = PaintedWall(short(rows=2, stroke_m=0.4, pattern=kind, start=start), hidden={NEAR, END})
+    world = wall(rows=2, stroke_m=0.4, pattern=kind, start=start, hidden={NEAR, END})
     along, across = {}, {}
     while not world.painter.finished:
         command = world.step()
@@ -205,10 +201,10 @@ def test_strokes_and_climbs_go_into_the_board_at_their_speed(kind: str, start: s
 
 
 def test_reset_starts_over_to_the_bit() -> None:
-    world = paint(PaintedWall(short(rows=2), noise=1e-3))
+    world = paint(wall(rows=2, noise=1e-3))
     log, errors = list(world.painter.log), world.place_errors()
     world.painter.reset()
-    again = paint(PaintedWall(short(rows=2), painter=world.painter, noise=1e-3))
+    again = paint(wall(rows=2, painter=world.painter, noise=1e-3))
     assert again.painter.log == log
     assert again.ends == world.ends
     np.testing.assert_array_equal(again.place_errors(), errors)
@@ -217,7 +213,7 @@ def test_reset_starts_over_to_the_bit() -> None:
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("rows", "top-left"), ("columns", "top-right")])
 def test_the_expected_edge_is_the_outer_one_of_the_last_stroke_or_of_stroke_one_itself(kind: str, start: str) -> None:
     """Offset, bare side and direction along the strokes of that edge beside the brush."""
-    world = PaintedWall(short(rows=3, stroke_m=0.4, pattern=kind, start=start))
+    world = wall(rows=3, stroke_m=0.4, pattern=kind, start=start)
     assert world.painter.expected_edge() is None
     for stroke in (1, 2):  # both towards -u: own edge of stroke 1 lies behind the brush, and stroke 2 returns
         world.fly(120.0, until="paint", stroke=stroke)
@@ -232,7 +228,7 @@ def test_the_expected_edge_is_the_outer_one_of_the_last_stroke_or_of_stroke_one_
 
 def test_the_guide_of_stroke_one_is_the_edge_at_which_the_pattern_starts() -> None:
     for kind, start in ALL_PATTERNS:
-        world = PaintedWall(short(stroke_m=0.4, pattern=kind, start=start))
+        world = wall(stroke_m=0.4, pattern=kind, start=start)
         world.fly(60.0, until="paint")
         world.step()
         assert world.guide == GUIDE

@@ -1,4 +1,4 @@
-"""Lines in pattern coordinates against a geometric construction, and the line that carries an error."""
+"""Lines in pattern coordinates against a geometric construction."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from painted_wall import GUIDE, NEAR, PaintedWall, Piece, short
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.painting.carrier import Carrier
 from ibvs_qp.painting.pattern import CORNERS, PATTERNS, Pattern
-from ibvs_qp.painting.pattern_lines import PatternLine, pattern_lines
+from ibvs_qp.painting.pattern_lines import pattern_lines
 
 TEN_DEG = math.radians(10.0)
 patterns = st.builds(Pattern, st.sampled_from(PATTERNS), st.sampled_from(CORNERS))
@@ -93,39 +92,19 @@ def test_a_sloped_board_s_edges_lie_at_their_nominal_places(kind: str, start: st
     assert (found[NEAR].place, found[NEAR].side) == (pytest.approx(-0.07), 1)
 
 
-# ----------------------------------------------------------------------------------------------------------- carrier
-
-
-def seen(*pieces: Piece, tip: tuple[float, float] = (0.0, 0.0), slope: float = 0.0) -> list[PatternLine]:
-    world = PaintedWall(short(), slope=slope)
-    world.tip, world.board = np.array(tip), list(pieces)
-    return pattern_lines(world.lines().values(), world.pattern, 0.0)
-
-
-def test_the_first_track_in_view_carries() -> None:
-    carrier = Carrier()
-    assert not carrier.update([], [7, 8]) and carrier.line is None
-    lines = seen(Piece.parallel(8, 0.02, 1), Piece.parallel(9, 0.03, 1))
-    assert carrier.update(lines, [7, 8, 9]) and carrier.line is not None and carrier.line.track.track_id == 8
-    assert not carrier.update(lines, [7, 8, 9])
-    assert carrier.update(lines, [9, 8])
-    dim = Piece.parallel(9, 0.03, 1)
-    dim.weight = 0.01
-    assert not carrier.update(seen(dim), [9]) and carrier.line is None
-
-
 @pytest.mark.parametrize("slope", [0.0, 0.15])
 @pytest.mark.parametrize("error", [-0.01, 0.0, 0.02])
-def test_a_tip_that_moves_until_its_line_is_at_the_target_has_lost_its_error(slope: float, error: float) -> None:
-    """The tip moves along v by the error; the line's offset is then the target."""
-    for piece in (Piece.parallel(1, -0.05, 1), Piece.upright(2, 0.06, -1)):
-        carrier = Carrier()
-        carrier.update(seen(piece, slope=slope), [piece.identity])
-        target = carrier.offset(error)
-        world = PaintedWall(short(), slope=slope)
-        right, down = world.pattern.to_wall(*((0.0, error) if piece.identity == 1 else (error, 0.0)))
-        (moved,) = seen(piece, tip=world.to_board(right, down), slope=slope)
-        assert moved.track.offset == pytest.approx(target, abs=1e-9)
+@pytest.mark.parametrize("piece", [Piece.parallel(1, -0.05, 1), Piece.upright(2, 0.06, -1)], ids=["along", "across"])
+def test_a_tip_that_moves_until_its_line_is_at_the_target_has_lost_its_error(
+    piece: Piece, error: float, slope: float
+) -> None:
+    """The tip moves along v or u by the error; the line's offset is then the target."""
+    world = PaintedWall(short(), slope=slope)
+    world.tip, world.board = np.zeros(2), [piece]
+    (line,) = pattern_lines(world.lines().values(), world.pattern, 0.0)
+    target = line.target(error)
+    world.tip = np.array(world.to_board(*world.pattern.to_wall(*((0.0, error) if line.parallel else (error, 0.0)))))
+    assert world.lines()[piece.identity].offset == pytest.approx(target, abs=1e-9)
 
 
 @given(patterns, angles)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +24,7 @@ from ibvs_qp.analysis.contact import (
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
+from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.pilot import Pilot, PilotConfig
 from ibvs_qp.presets import FOLDER
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
@@ -45,8 +45,8 @@ def with_gains(**gains: float) -> ControllerConfig:
 class StepPainter(HoldPainter):
     """Holds, with a step of the push command."""
 
-    def _command(self, inputs: Any, **rest: Any) -> Any:
-        command = super()._command(inputs, **rest)
+    def step(self, inputs: PainterInput) -> PaintingCommand:
+        command = super().step(inputs)
         late = self.phase == "paint" and inputs.time_s - self.entered > STEP_TIME
         return dataclasses.replace(command, push=command.push + STEP) if late else command
 
