@@ -3,86 +3,21 @@
 The names load on first use: a program that only checks its command line need not wait for solvers and OpenCV.
 """
 
-from __future__ import annotations
-
+import ast
 import importlib
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    __version__: str
+# pyright: reportUnsupportedDunderAll=false
 
-    from allocation import TAROT_T960, RotorGeometry, control_effectiveness
-    from ibvs_qp.analytic import PaperController
-    from ibvs_qp.assured import Assured
-    from ibvs_qp.command import ActiveLimit, Command, Outcome, SafetyState, TaskReport
-    from ibvs_qp.config import ControllerConfig, SafetySettings
-    from ibvs_qp.config.errors import ConfigError, IbvsQpError
-    from ibvs_qp.config.vehicle import VehicleParams
-    from ibvs_qp.controller import HybridController
-    from ibvs_qp.measurement import (
-        FeatureFrame,
-        LineFeature,
-        LineReference,
-        Measurement,
-        Reference,
-        RgbdFrame,
-        SensorFrame,
-    )
-    from ibvs_qp.painting.command import PainterInput, PaintingCommand
-    from ibvs_qp.painting.strategy import Strategy
-    from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
-    from ibvs_qp.presets import preset
-
-__all__ = [
-    "TAROT_T960",
-    "ActiveLimit",
-    "Assured",
-    "Command",
-    "ConfigError",
-    "ControllerConfig",
-    "FeatureFrame",
-    "FlightStatus",
-    "HybridController",
-    "IbvsQpError",
-    "LineFeature",
-    "LineReference",
-    "Measurement",
-    "Outcome",
-    "PainterInput",
-    "PaintingCommand",
-    "PaperController",
-    "Pilot",
-    "PilotConfig",
-    "Reference",
-    "RgbdFrame",
-    "RotorGeometry",
-    "SafetySettings",
-    "SafetyState",
-    "SensorFrame",
-    "Strategy",
-    "TaskReport",
-    "VehicleParams",
-    "__version__",
-    "control_effectiveness",
-    "preset",
-]
-
-_HOMES = {
-    "allocation": ("TAROT_T960", "RotorGeometry", "control_effectiveness"),
-    "ibvs_qp.analytic": ("PaperController",),
-    "ibvs_qp.assured": ("Assured",),
-    "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "SafetyState", "TaskReport"),
-    "ibvs_qp.config.controller": ("ControllerConfig",),
-    "ibvs_qp.config.safety": ("SafetySettings",),
-    "ibvs_qp.controller": ("HybridController",),
-    "ibvs_qp.config.errors": ("ConfigError", "IbvsQpError"),
-    "ibvs_qp.painting.command": ("PainterInput", "PaintingCommand"),
-    "ibvs_qp.painting.strategy": ("Strategy",),
-    "ibvs_qp.pilot": ("FlightStatus", "Pilot", "PilotConfig"),
-    "ibvs_qp.config.vehicle": ("VehicleParams",),
-    "ibvs_qp.presets": ("preset",),
+#: Modules of the public names; the list is the stub `__init__.pyi`, which type checkers read.
+_HOME_OF = {
+    alias.name: str(node.module)
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(node, ast.ImportFrom)
+    for alias in node.names
 }
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+__all__ = [*_HOME_OF, "__version__"]
 
 
 def __getattr__(name: str) -> Any:
@@ -91,6 +26,6 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("ibvs-qp")
-    if name not in __all__:
+    if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOME_OF.get(name, "ibvs_qp.measurement")), name)
+    return getattr(importlib.import_module(_HOME_OF[name]), name)

@@ -1,0 +1,32 @@
+from allocation import TAROT_T960 as TAROT_T960
+from allocation import RotorGeometry as RotorGeometry
+from allocation import control_effectiveness as control_effectiveness
+from ibvs_qp.analytic import PaperController as PaperController
+from ibvs_qp.assured import Assured as Assured
+from ibvs_qp.command import ActiveLimit as ActiveLimit
+from ibvs_qp.command import Command as Command
+from ibvs_qp.command import Outcome as Outcome
+from ibvs_qp.command import SafetyState as SafetyState
+from ibvs_qp.command import TaskReport as TaskReport
+from ibvs_qp.config import ControllerConfig as ControllerConfig
+from ibvs_qp.config import SafetySettings as SafetySettings
+from ibvs_qp.config.errors import ConfigError as ConfigError
+from ibvs_qp.config.errors import IbvsQpError as IbvsQpError
+from ibvs_qp.config.vehicle import VehicleParams as VehicleParams
+from ibvs_qp.controller import HybridController as HybridController
+from ibvs_qp.measurement import FeatureFrame as FeatureFrame
+from ibvs_qp.measurement import LineFeature as LineFeature
+from ibvs_qp.measurement import LineReference as LineReference
+from ibvs_qp.measurement import Measurement as Measurement
+from ibvs_qp.measurement import Reference as Reference
+from ibvs_qp.measurement import RgbdFrame as RgbdFrame
+from ibvs_qp.measurement import SensorFrame as SensorFrame
+from ibvs_qp.painting.command import PainterInput as PainterInput
+from ibvs_qp.painting.command import PaintingCommand as PaintingCommand
+from ibvs_qp.painting.strategy import Strategy as Strategy
+from ibvs_qp.pilot import FlightStatus as FlightStatus
+from ibvs_qp.pilot import Pilot as Pilot
+from ibvs_qp.pilot import PilotConfig as PilotConfig
+from ibvs_qp.presets import preset as preset
+
+__version__: str
