@@ -135,11 +135,11 @@ def _arrow(start: Vector, axis: Vector, length: float, color: Vector) -> Message
 
 def vehicle_points(vehicle: VehicleParams, ns: int) -> PointCloud:
     """Circles of the rotors and the arm as points."""
-    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)[:, None, None]
-    across = np.cross(vehicle.geometry.axes, (1.0, 0.0, 0.0))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    rings = np.cos(angles) * across + np.sin(angles) * np.cross(vehicle.geometry.axes, across)
-    circles = vehicle.geometry.positions + vehicle.propeller_radius_m * rings
+    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)[:, None]
+    axes, centres = np.array(vehicle.geometry.axes)[:, None], np.array(vehicle.geometry.positions)[:, None]
+    across = np.cross(axes, (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across, axis=2, keepdims=True)
+    circles = centres + vehicle.propeller_radius_m * (np.cos(angles) * across + np.sin(angles) * np.cross(axes, across))
     arm = np.linspace(0.0, 1.0, _POINTS)[:, None] * np.array(vehicle.tip_position_m)
     return _cloud(np.concatenate((circles.reshape(-1, 3), arm)), VEHICLE, ns)
 
