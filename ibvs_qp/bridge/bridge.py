@@ -5,22 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import Participant
 from ibvs_qp.bridge.gate import BridgeState, Gate
 from ibvs_qp.bridge.inputs import MODE, PAIR, Inputs
-from ibvs_qp.bridge.outputs import Outputs, Publisher
+from ibvs_qp.bridge.outputs import Outputs, publications
 from ibvs_qp.command import SafetyState
 from ibvs_qp.pilot import Pilot, PilotConfig
 from ibvs_qp.validation.self_check import SelfCheck
 
-#: Sensors without which nothing flies.
+#: Sensors that are needed in flight.
 _INERTIAL = ("imu", "attitude")
 
 
 def checks(config: BridgeConfig, flight: PilotConfig) -> tuple[str, ...]:
-    """What must hold before the bridge is ready, in words."""
+    """Conditions of a bridge that is ready, in words."""
     return (
         f"imu and attitude arrived within {config.link_timeout_s:g} s, wrench and pictures within "
         f"{config.sensor_timeout_s:g} s, PX4's mode within {config.mode_timeout_s:g} s",
@@ -36,23 +37,14 @@ def checks(config: BridgeConfig, flight: PilotConfig) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeStatus:
-    """What the bridge does.
-
-    Attributes:
-        state: Its state.
-        reason: Why.
-        phase: Phase of the flight, empty unless flying.
-        safety: State of the pilot's supervisor and its reasons, empty unless flying.
-        commands: Ticks with setpoints.
-        ignored: Messages left out, by role and reason.
-    """
+    """State of the bridge."""
 
     state: BridgeState
     reason: str
-    phase: str
-    safety: str
-    commands: int
-    ignored: dict[str, int]
+    phase: str  # of the flight, empty unless flying
+    safety: str  # state of the pilot's supervisor and its reasons, empty unless flying
+    commands: int  # ticks with setpoints
+    ignored: dict[str, int]  # messages left out, by role and reason
 
 
 class Bridge:
@@ -79,16 +71,16 @@ class Bridge:
         pilot: Pilot | None = None,
     ) -> None:
         self.config, self._flight, self._clock = config, flight, clock
-        self.tick_s = flight.controller.tick_s
+        self.tick_s, self._oldest_s = flight.controller.tick_s, flight.safety.imu_age_s
         self._outputs = Outputs(config, flight.controller.vehicle)
         participant = Participant(config.domain_id)
-        self.inputs, self._publisher = Inputs(config, participant, clock), Publisher(config, participant)
+        self.inputs = Inputs(config, participant, clock)
+        self._writers = {topic: participant.writer(topic, name) for topic, name in publications(config).items()}
         self.pilot = pilot or Pilot(flight)
         self.pilot.prepare()
         self._prepared = False  # perception, for pictures of this camera
-        self._oldest_s = flight.safety.imu_age_s
         self.gate, self._check = Gate(config.check_s), SelfCheck(flight.safety.self_check)
-        self._alive_ns, self._next_alive_ns, self._last_ns, self._commands = round(1e9 / config.alive_hz), 0, -1, 0
+        self._next_alive_ns, self._last_ns, self._commands = 0, -1, 0
 
     @property
     def status(self) -> BridgeStatus:
@@ -104,11 +96,7 @@ class Bridge:
         )
 
     def tick(self, now_ns: int) -> bool:
-        """Read, decide, fly and send; for `ibvs_qp.pilot.runner.run`.
-
-        Args:
-            now_ns: Monotonic time [ns].
-        """
+        """Read, decide, fly and send at a monotonic time [ns]; for `ibvs_qp.pilot.runner.run`."""
         self.inputs.poll(now_ns)
         config, before, clock_ns = self.config, self.gate.state, self._clock()
         ages = {role: self.inputs.age_s(role, clock_ns) for role in _INERTIAL}
@@ -131,8 +119,8 @@ class Bridge:
             if BridgeState.FLYING in (before, state) or (lost and not self._check.passed):
                 self._check.reset()
         if self.gate.state in (BridgeState.READY, BridgeState.FLYING) and now_ns >= self._next_alive_ns:
-            self._next_alive_ns = now_ns + self._alive_ns
-            self._publisher.alive(self._outputs.alive(self._clock()))
+            self._next_alive_ns = now_ns + round(1e9 / config.alive_hz)
+            self._send(self._outputs.alive(self._clock()))
         self._last_ns = now_ns
         return True
 
@@ -143,11 +131,15 @@ class Bridge:
         if command.safety is SafetyState.TERMINATED:
             self.gate.stop(f"flight ended: {'; '.join(command.safety_reasons)}")
             return
-        self._publisher.setpoints(self._outputs.setpoints(command, frame.imu_stamp_ns, self._clock()))
+        self._send(self._outputs.setpoints(command, frame.imu_stamp_ns, self._clock()))
         self._commands += 1
 
+    def _send(self, messages: dict[str, Any]) -> None:
+        for topic, value in messages.items():
+            self._writers[topic].write(value)
+
     def _missing(self, now_ns: int, lost: list[str]) -> list[str]:
-        """What keeps the bridge from being ready, beside lost inputs: old sensors, wrong lens, faults in the axes."""
+        """Reasons not to be ready, beside lost inputs: old sensors, wrong lens, faults in the axes."""
         timeout, held = self.config.sensor_timeout_s, self.inputs.held
         found = [role for role in ("wrench", "color", "depth") if self.inputs.older(role, now_ns, timeout)]
         if not found and self.inputs.older(PAIR, now_ns, timeout):

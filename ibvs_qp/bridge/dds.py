@@ -47,19 +47,19 @@ class Participant:
     def reader(self, topic: str, name: str, depth: int = SAMPLE_DEPTH) -> Reader:
         """Reader of a ROS 2 topic and type, with the last ``depth`` samples."""
         from cyclonedds.sub import DataReader
-        from cyclonedds.topic import Topic
 
-        kind, qos = raw_type(name), _qos(depth)
-        return Reader(DataReader(self._participant, Topic(self._participant, dds_topic(topic), kind), qos=qos), depth)
+        return Reader(DataReader(self._participant, self._topic(topic, name), qos=_qos(depth)), depth)
 
     def writer(self, topic: str, name: str) -> Writer:
         """Writer of a ROS 2 topic and type."""
         from cyclonedds.pub import DataWriter
+
+        return Writer(DataWriter(self._participant, self._topic(topic, name), qos=_qos(1)), name)
+
+    def _topic(self, topic: str, name: str) -> Any:
         from cyclonedds.topic import Topic
 
-        kind = raw_type(name)
-        writer = DataWriter(self._participant, Topic(self._participant, dds_topic(topic), kind), qos=_qos(1))
-        return Writer(writer, kind, name)
+        return Topic(self._participant, dds_topic(topic), raw_type(name))
 
 
 class Reader:
@@ -76,16 +76,16 @@ class Reader:
 class Writer:
     """Writes messages of one type."""
 
-    def __init__(self, writer: Any, kind: Any, name: str) -> None:
-        self._writer, self._kind, self._name = writer, kind, name
+    def __init__(self, writer: Any, name: str) -> None:
+        self._writer, self._name = writer, name
 
     def write(self, message: Any) -> None:
         """Write a message of `ibvs_qp.ros.messages`."""
         self.write_bytes(encoded(message, self._name))
 
     def write_bytes(self, data: bytes) -> None:
-        """Write CDR, or what a test wants to pass for it."""
-        self._writer.write(self._kind(data))
+        """Write bytes as CDR."""
+        self._writer.write(raw_type(self._name)(data))
 
 
 @functools.cache
@@ -96,12 +96,9 @@ def raw_type(name: str) -> Any:
     def keep(self: Any, data: bytes) -> None:
         self.data = bytes(data)
 
-    def made(cls: Any, data: bytes, **_: Any) -> Any:
-        return cls(data)
-
-    kind.__init__, kind.deserialize = keep, classmethod(made)
-    kind.serialize = lambda self, **_: self.data
-    kind.deserialize_key = classmethod(lambda cls, data, **_: None)
+    kind.__init__, kind.serialize = keep, lambda self, **_: self.data
+    kind.deserialize = classmethod(lambda _, data, **__: kind(data))
+    kind.deserialize_key = classmethod(lambda *_, **__: None)
     return kind
 
 

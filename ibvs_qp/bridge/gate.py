@@ -17,15 +17,11 @@ class BridgeState(StrEnum):
 
 
 class Gate:
-    """State machine of the bridge.
+    """State machine of the bridge, with the reason of its state.
 
     PX4 refuses Offboard mode without proof of life, so holding that back keeps PX4 from arming in Offboard and from
-    switching to it. The bridge never arms, and never goes on by itself after a stop: PX4 must have left Offboard mode
+    switching to it. The bridge never arms, and never resumes by itself after a stop: PX4 must have left Offboard mode
     first.
-
-    Attributes:
-        state: Present state.
-        reason: Why it is in that state.
 
     Args:
         check_s: Time without a fault before the bridge is ready [s].
@@ -33,7 +29,7 @@ class Gate:
 
     def __init__(self, check_s: float) -> None:
         self._check_ns = round(1e9 * check_s)
-        self._sound_ns: int | None = None  # since when nothing is missing and nothing was found
+        self._sound_ns: int | None = None  # since when nothing is missing and there is no fault
         self._fault = ""  # the last one of this preparation
         self.state, self.reason = BridgeState.WAITING, "no message yet"
 
@@ -42,18 +38,16 @@ class Gate:
 
         Args:
             now_ns: Time of the tick [ns].
-            lost: Inputs without which nothing flies, that are too old.
-            missing: What else keeps the bridge from being ready: old inputs, faults of the self-check.
+            lost: Inputs that are too old and needed in flight.
+            missing: Other reasons not to be ready: old inputs, faults of the self-check.
             engaged: Whether PX4 is armed and in Offboard mode; None if its mode is too old.
         """
-        if self.state is BridgeState.FLYING:
-            if lost or engaged is None:
-                self.stop(f"link lost: {', '.join(lost) or 'mode of PX4'}")
-            elif not engaged:
-                self._restart("PX4 left Offboard mode")
-        elif self.state is BridgeState.STOPPED:
+        if self.state is BridgeState.FLYING and (lost or engaged is None):
+            self.stop(f"link lost: {', '.join(lost) or 'mode of PX4'}")
+        elif self.state in (BridgeState.FLYING, BridgeState.STOPPED):
             if engaged is False:
-                self._restart("PX4 left Offboard mode")
+                self.state, self.reason = BridgeState.CHECKING, "PX4 left Offboard mode"
+                self._sound_ns, self._fault = None, ""
         else:
             self._prepare(now_ns, [*lost, *missing], engaged)
         return self.state
@@ -61,9 +55,6 @@ class Gate:
     def stop(self, reason: str) -> None:
         """Send nothing from now on, so that PX4's failsafe for a lost Offboard signal takes over."""
         self.state, self.reason = BridgeState.STOPPED, reason
-
-    def _restart(self, reason: str) -> None:
-        self.state, self.reason, self._sound_ns, self._fault = BridgeState.CHECKING, reason, None, ""
 
     def _prepare(self, now_ns: int, problems: Sequence[str], engaged: bool | None) -> None:
         if self.state is BridgeState.READY and not problems and engaged:

@@ -1,4 +1,4 @@
-"""What the bridge receives: samples and pictures of the vehicle, and PX4's mode."""
+"""Messages that the bridge receives: samples and pictures of the vehicle, and PX4's mode."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from typing import Literal, NamedTuple
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import PICTURE_DEPTH, SAMPLE_DEPTH, Participant
 from ibvs_qp.ros.held import HeldSamples
-from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, WRENCH, BadMessage, decoded
-from ibvs_qp.ros.stamps import from_px4
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, WRENCH, BadMessage, decoded, from_px4
 from ibvs_qp.ros.topics import CAMERA, MOTION
 
 CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
 #: Roles beside those of `ibvs_qp.ros.topics.ACCEPTED`: PX4's mode, and a colour picture with its depth.
 MODE, PAIR = "mode", "pair"
+#: Largest message, and picture without its pixels [bytes]: 1 kB, and names of frames.
+LARGEST_MESSAGE = 4096
 #: Largest picture [bytes]: 1920 x 1080 px of four bytes; decoding takes 15 ms.
 LARGEST_PICTURE = 4 * 1920 * 1080
-#: Largest message of any other type, and of a picture without its pixels [bytes]: 1 kB, and names of frames.
-LARGEST_MESSAGE = 4096
 #: Places of timestamp, flag_armed and flag_control_offboard_enabled in CDR [bytes].
 _TIMESTAMP, _ARMED, _OFFBOARD = 4, 12, 16
 #: Byte orders by the header of CDR.
@@ -27,29 +26,19 @@ _ORDERS: dict[bytes, Literal["big", "little"]] = {b"\0\0": "big", b"\0\1": "litt
 
 
 class ControlMode(NamedTuple):
-    """What matters of PX4's mode."""
+    """Mode of PX4: whether it accepts the bridge's setpoints (armed and in Offboard mode), and its time."""
 
     stamp_ns: int
-    armed: bool
-    offboard: bool
-
-    @property
-    def engaged(self) -> bool:
-        """Whether PX4 accepts the bridge's setpoints."""
-        return self.armed and self.offboard
+    engaged: bool
 
 
 def control_mode(data: bytes) -> ControlMode:
-    """Time and two flags of ``px4_msgs/VehicleControlMode``; what follows them differs between versions of PX4.
-
-    Raises:
-        BadMessage: When the bytes are too few, the flags no booleans, or the time is none.
-    """
+    """Mode from ``px4_msgs/VehicleControlMode``, or BadMessage; the later fields differ between versions of PX4."""
     order = _ORDERS.get(data[:2])
     if len(data) <= _OFFBOARD or order is None or max(data[_ARMED : _OFFBOARD + 1]) > 1:
         raise BadMessage("undecodable")
     stamp = from_px4(int.from_bytes(data[_TIMESTAMP:_ARMED], order))
-    return ControlMode(stamp, bool(data[_ARMED]), bool(data[_OFFBOARD]))
+    return ControlMode(stamp, bool(data[_ARMED] and data[_OFFBOARD]))
 
 
 class Subscription(NamedTuple):
@@ -69,18 +58,17 @@ class Subscription(NamedTuple):
 def subscriptions(config: BridgeConfig) -> tuple[Subscription, ...]:
     """Topics that the bridge reads."""
     types = {"imu": config.imu_type, "attitude": config.attitude_type, "wrench": WRENCH, "camera_info": CAMERA_INFO}
-    names = config.topics.names((*MOTION, *CAMERA))
-    found = [
+    types |= {"color": IMAGE, "depth": IMAGE, MODE: CONTROL_MODE}
+    names = config.topics.names((*MOTION, *CAMERA)) | {MODE: "/fmu/out/vehicle_control_mode"}
+    return tuple(
         Subscription(
             role,
             config.namespace + name if name.startswith("/fmu/") else name,
-            types.get(role, IMAGE),
-            PICTURE_DEPTH if role in ("color", "depth") else SAMPLE_DEPTH,
+            types[role],
+            PICTURE_DEPTH if types[role] == IMAGE else SAMPLE_DEPTH,
         )
         for role, name in names.items()
-    ]
-    mode = Subscription(MODE, f"{config.namespace}/fmu/out/vehicle_control_mode", CONTROL_MODE, SAMPLE_DEPTH)
-    return (*found, mode)
+    )
 
 
 class Inputs:
@@ -105,7 +93,7 @@ class Inputs:
         self.arrived_ns: dict[str, int] = {}
 
     def poll(self, now_ns: int) -> None:
-        """Take what arrived since the last tick; what cannot be used is counted."""
+        """Take the messages since the last tick; unusable ones are counted."""
         for role, (reader, topic) in self._readers.items():
             for data in reader.take():
                 pairs = self.held.pairs

@@ -1,4 +1,4 @@
-"""What a log says of the controller that flew: enough to build it again."""
+"""Facts of a log about its controller, from which it is built again."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ def header(flown: Pilot | Assured | CheckedLaw) -> dict[str, str]:
     law: Any = flown if isinstance(flown, CheckedLaw) else flown.controller
     kind = PILOT if isinstance(flown, Pilot) else ASSURED if isinstance(flown, Assured) else CONTROLLER
     config = dump_toml(flown.config if isinstance(flown, Pilot) else law.config, derived=True)
-    own = next((name for name, shipped in LAWS.items() if type(law) is shipped), "")
+    shipped = next((name for name, kind in LAWS.items() if type(law) is kind), "")
     return {
         "format": FORMAT,
         "version": version("ibvs-qp"),
         "kind": kind,
-        "law": own or f"{type(law).__module__}.{type(law).__qualname__}",
+        "law": shipped or f"{type(law).__module__}.{type(law).__qualname__}",
         "config": config,
         "config_sha256": digest(config),
         "safety": dump_toml(flown.assurance.settings) if isinstance(flown, Assured) else "",
-        "rows": ",".join(rows(law)),
+        "rows": _rows(law),
         "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "packages": ", ".join(f"{name} {version(name)}" for name in _PACKAGES),
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -54,13 +54,13 @@ def digest(config: str) -> str:
     return hashlib.sha256(config.encode()).hexdigest()
 
 
-def rows(law: Any) -> tuple[str, ...]:
-    """Names of the program's rows of tasks and limits; none under a law without a program."""
+def _rows(law: Any) -> str:
+    """Names of the program's rows of tasks and limits; empty under a law without a program."""
     problem = getattr(law, "problem", None)
-    return () if problem is None else (*(row.name for row in problem.task_rows), *problem.row_names)
+    return "" if problem is None else ",".join((*(row.name for row in problem.task_rows), *problem.row_names))
 
 
-def flown_controller(facts: Mapping[str, str]) -> CheckedLaw | Assured:
+def recorded_controller(facts: Mapping[str, str]) -> CheckedLaw | Assured:
     """The controller of a log, as before its first tick.
 
     Raises:
@@ -70,9 +70,8 @@ def flown_controller(facts: Mapping[str, str]) -> CheckedLaw | Assured:
         raise ConfigError(f"flown by a law of its own, {facts['law']}; replay it from Python with that controller")
     kind = PilotConfig if facts["kind"] == PILOT else ControllerConfig
     config = from_dict(kind, parse_toml(facts["config"], "the log's configuration"))
-    settings = straightened(config.controller) if isinstance(config, PilotConfig) else config
-    law = LAWS[facts["law"]](settings)  # type: ignore[abstract]
-    if ",".join(rows(law)) != facts["rows"]:
+    law = LAWS[facts["law"]](straightened(config.controller) if isinstance(config, PilotConfig) else config)  # type: ignore[abstract]
+    if _rows(law) != facts["rows"]:
         raise ConfigError("flown with tasks or limits of its own; replay it from Python with that controller")
     if facts["kind"] != ASSURED:
         return law

@@ -1,152 +1,137 @@
-"""Messages of a tick, made in the thread of the log."""
+"""Topics of a tick: its exact inputs for replay, a row for plots, changes in words, and the pose at the wall."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
-from ibvs_qp.command import Command
+from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.wall_lines import WallAxes
 from ibvs_qp.frames import down_in_body, rotate
-from ibvs_qp.measurement import Measurement, RgbdFrame, SensorFrame
-from ibvs_qp.recording import poses, shapes
-from ibvs_qp.recording.camera import CameraTopics
+from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.recording import scene
 from ibvs_qp.recording.messages import encode
-from ibvs_qp.recording.ticks import ControllerInput, ControlTick
-from ibvs_qp.recording.writer import Sink
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.recording.writer import LogWriter
 
 INPUT_TOPIC, CONTROL_TOPIC, SENSORS_TOPIC = "/controller/input", "/control", "/sensors"
 #: Least time between poses, and between shapes that do not change [ns].
 POSE_NS, SHAPE_NS = 40_000_000, 1_000_000_000
+#: Kinds of a `ControllerInput`: a step of the controller, thrusts of the supervisor in its place, and a reset.
+STEP, SUPERVISOR, RESET = "step", "supervisor", "reset"
+
+
+@dataclass(kw_only=True)
+class ControllerInput:
+    """Exact inputs of the controller at one tick, for replay."""
+
+    tick: int  # number, from 0; a gap means lost ticks
+    call: str  # STEP, SUPERVISOR or RESET
+    measurement: Measurement | None = None  # as given to the controller
+    reference: Reference | None = None  # as given to the controller
+    contact: ContactState | None = None  # as a pilot estimates it; None where the controller estimates it
+    fixed_thrusts: np.ndarray | None = None  # of the supervisor [N], (n,), before box and rate limit
+
+
+@dataclass(kw_only=True)
+class ControlTick:
+    """One tick, for plots."""
+
+    tick: int  # as of the input
+    stamp_ns: int
+    phase: str  # of a pilot's strategy; empty without a pilot
+    safety: SafetyState  # of the supervisor; nominal without one
+    safety_reasons: tuple[str, ...]
+    rejected: tuple[str, ...]  # inputs refused by pilot and controller
+    push_n: float  # filtered
+    push_reference_n: float  # within reach
+    distance_m: float  # tip to wall
+    thrust_low_n: np.ndarray  # limits in force, (n,)
+    thrust_high_n: np.ndarray
+    step_us: float  # duration of the step
+    dropped: int  # entries dropped so far, because the writer was late
+    command: Command  # of the law, or of the supervisor in its place
+
+
+def write_message(log: LogWriter, topic: str, value: Any, kind: type | None = None) -> None:
+    """Write a dataclass as a message of its kind, by default its own."""
+    log.write(topic, encode(value, kind))
 
 
 class TickTopics:
-    """Writes what a recorder hands over.
-
-    Args:
-        vehicle: The vehicle, for its picture.
-    """
+    """Writes the ticks of one flight, in the thread of the log."""
 
     def __init__(self, vehicle: VehicleParams) -> None:
-        self._vehicle, self._camera = vehicle, CameraTopics()
-        self._pose_ns, self._shape_ns = -POSE_NS, -SHAPE_NS
-        self._said: tuple[Any, ...] = ()
+        self._vehicle, self._pose_ns, self._shape_ns = vehicle, -POSE_NS, -SHAPE_NS
+        self._words: tuple[Any, ...] = ("", None, ())
 
-    def write_tick(
+    def __call__(
         self,
-        sink: Sink,
-        numbers: tuple[int, int, int, float],
-        state: tuple[ContactState, Any, Any],
-        call: str,
-        given: tuple[Any, Any, Any, Any],
-        own: Command,
-        command: Command,
-        phase: str = "",
-        seen: tuple[ContactState, float, float] | None = None,
+        log: LogWriter,
+        given: ControllerInput,
+        row: ControlTick,
+        contact: ContactState,
+        odometer: Sequence[float] = (0.0, 0.0),
     ) -> None:
-        """Write input, command and poses of a tick.
+        """Write a tick.
 
         Args:
-            sink: The file.
-            numbers: Number of the tick, duration of the step [ns], dropped entries, push reference [N].
-            state: Contact of the controller, lower and upper thrust limits [N].
-            call: `STEP` or `SUPERVISOR`.
-            given: Measurement, reference, contact and fixed thrusts of the controller.
-            own: Command of the law, or of what replaced it.
-            command: Command of the step.
-            phase: Phase of a pilot's strategy.
-            seen: Contact of a pilot, and its odometer right and down [m].
+            log: The log.
+            given: Inputs of the controller.
+            row: The tick.
+            contact: Wall and contact, of a pilot or of the controller.
+            odometer: Way of a pilot right and down [m]; without one it is not known and 0.
         """
-        tick, step_ns, dropped, push_reference = numbers
-        measurement, reference, contact, fixed = given
-        exact = ControllerInput(
-            tick=tick, call=call, measurement=measurement, reference=reference, contact=contact, fixed_thrusts=fixed
-        )
-        sink.write(INPUT_TOPIC, encode(exact), own.stamp_ns or None)
-        found, low, high = state
-        if seen is not None:
-            found = seen[0]
-        row = ControlTick(
-            tick=tick,
-            stamp_ns=own.stamp_ns,
-            phase=phase,
-            safety=command.safety,
-            safety_reasons=command.safety_reasons,
-            rejected=command.rejected,
-            push_n=found.push,
-            push_reference_n=push_reference,
-            distance_m=found.distance,
-            thrust_low_n=low,
-            thrust_high_n=high,
-            step_us=step_ns * 1e-3,
-            dropped=dropped,
-            command=own,
-        )
-        sink.write(CONTROL_TOPIC, encode(row))
-        self._say(sink, phase, command)
-        now = sink.stamp_ns
-        if isinstance(measurement, Measurement) and found.known and abs(now - self._pose_ns) >= POSE_NS:
+        log.write(INPUT_TOPIC, encode(given), row.stamp_ns or None)
+        log.write(CONTROL_TOPIC, encode(row))
+        self._note_changes(log, row)
+        measurement, now = given.measurement, log.stamp_ns
+        if isinstance(measurement, Measurement) and contact.known and abs(now - self._pose_ns) >= POSE_NS:
             self._pose_ns = now
-            self._write_pose(sink, measurement, found, seen[1:] if seen else (0.0, 0.0), own)
+            if np.isfinite(measurement.attitude).all():
+                self._write_pose(log, measurement, contact, odometer, row.command.thrusts)
 
-    def write_input(self, sink: Sink, given: ControllerInput) -> None:
-        """Write an input alone."""
-        sink.write(INPUT_TOPIC, encode(given))
-
-    def write_frame(self, sink: Sink, frame: SensorFrame) -> None:
-        """Write the raw sensors of a pilot's tick."""
-        sink.write(SENSORS_TOPIC, encode(frame, SensorFrame))
-
-    def write_picture(self, sink: Sink, picture: RgbdFrame, perceived: PerceptionResult | None, stamp_ns: int) -> None:
-        """Write a picture and what was seen in it."""
-        self._camera(sink, picture, perceived, stamp_ns)
-
-    def write_note(self, sink: Sink, name: str, text: str) -> None:
-        """Write a line."""
-        sink.note(Log.INFO, name, text)
-
-    def _say(self, sink: Sink, phase: str, command: Command) -> None:
-        """Write what changed in words: phase, state of the supervisor, refused inputs."""
+    def _note_changes(self, log: LogWriter, row: ControlTick) -> None:
+        """Write changes of phase, supervisor and refused inputs in words."""
         # The numbers after a colon may change from tick to tick.
-        refused = tuple([reason.split(":")[0] for reason in command.rejected])
-        now = phase, command.safety, refused
-        if now == self._said:
-            return
-        before, self._said = self._said or ("", None, ()), now
-        if phase != before[0]:
-            sink.note(Log.INFO, "phase", phase)
-        if command.safety != before[1] and before[1] is not None:
-            reasons = "; ".join(command.safety_reasons)
-            sink.note(Log.WARNING, "supervisor", f"{command.safety}: {reasons}".removesuffix(": "))
-        for reason, name in zip(command.rejected, refused, strict=True):
-            if name not in before[2]:
-                sink.note(Log.WARNING, "rejected", reason)
+        refused = tuple([reason.split(":")[0] for reason in row.rejected])
+        (phase, safety, known), self._words = self._words, (row.phase, row.safety, refused)
+        if row.phase != phase:
+            log.note(Log.INFO, "phase", row.phase)
+        if safety not in (None, row.safety):
+            log.note(Log.WARNING, "supervisor", f"{row.safety}: {'; '.join(row.safety_reasons)}".removesuffix(": "))
+        for reason, name in zip(row.rejected, refused, strict=True):
+            if name not in known:
+                log.note(Log.WARNING, "rejected", reason)
 
     def _write_pose(
-        self, sink: Sink, measurement: Measurement, contact: ContactState, odometer: Any, own: Command
+        self,
+        log: LogWriter,
+        measurement: Measurement,
+        contact: ContactState,
+        odometer: Sequence[float],
+        thrusts: np.ndarray,
     ) -> None:
-        """Write the pose at the wall; along it by a pilot's odometer, otherwise it is not known and 0."""
-        now, vehicle = sink.stamp_ns, self._vehicle
+        now, vehicle = log.stamp_ns, self._vehicle
         axes = WallAxes.of(contact.normal, down_in_body(measurement.attitude.tolist()))
-        rotation = poses.wall_from_body(axes.right, axes.down, axes.normal)
-        right, down = odometer
-        tip = rotate(rotation, vehicle.tip_position_m)
+        rotation = scene.wall_from_body(axes)
+        (right, down), tip = odometer, rotate(rotation, vehicle.tip_position_m)
         position = (-contact.distance - tip[0], -right - tip[1], -down - tip[2])
-        turn = poses.quaternion(rotation)
-        frames = FrameTransforms()
-        poses.transform(frames, poses.WALL, poses.VEHICLE, position, turn, now)
+        turn = scene.quaternion(rotation)
+        frames = [scene.transform(scene.WALL, scene.VEHICLE, position, turn, now)]
         if abs(now - self._shape_ns) >= SHAPE_NS:
             self._shape_ns = now
-            poses.mounts(frames, vehicle, now)
-            sink.write("/vehicle/shape", shapes.vehicle_scene(vehicle, poses.VEHICLE, now))
-            sink.write("/vehicle/points", shapes.vehicle_points(vehicle, now))
-            sink.write("/wall/shape", shapes.estimated_wall(now))
-            sink.write("/wall/points", shapes.wall_points(now))
-        sink.write("/tf", frames)
-        sink.write("/vehicle/pose", poses.pose_in_frame(poses.WALL, position, turn, now))
-        sink.write("/vehicle/forces", shapes.force_arrows(vehicle, own.thrusts, contact.push, contact.normal, now))
+            frames += scene.mounts(vehicle, now)
+            log.write("/vehicle/shape", scene.vehicle_scene(vehicle, scene.VEHICLE, now))
+            log.write("/vehicle/points", scene.vehicle_points(vehicle, now))
+            log.write("/wall/shape", scene.estimated_wall(now))
+            log.write("/wall/points", scene.wall_points(now))
+        log.write("/tf", FrameTransforms(transforms=frames))
+        log.write("/vehicle/pose", scene.pose_in_frame(scene.WALL, position, turn, now))
+        log.write("/vehicle/forces", scene.force_arrows(vehicle, thrusts, contact.push, contact.normal, now))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +18,8 @@ from ibvs_qp.ros.topics import ACCEPTED, CAMERA, MOTION, Topics
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
 
-#: An IMU's message makes a frame unless the last frame is younger than this share of a tick: faster IMUs are thinned.
-LEAST_SHARE = 0.75
+#: A message of the IMU makes no frame if the last frame is younger than this ratio of a tick: faster IMUs are thinned.
+LEAST_RATIO = 0.75
 
 
 class Bag:
@@ -50,10 +51,14 @@ class Bag:
         Raises:
             ConfigError: When the bag cannot be read, lacks a topic, has one of another type, or has another lens.
         """
-        least_ns, last = round(LEAST_SHARE * 1e9 * period_s), None
+        least_ns, last = round(LEAST_RATIO * 1e9 * period_s), None
         for role in self._pass(MOTION, CAMERA):
-            if role == "camera_info":
-                self._check_lens(distortion)
+            camera = self.held.camera
+            if role == "camera_info" and camera is not None and not camera.has_lens(distortion):
+                raise ConfigError(
+                    f"{self.path}: the lens of camera_info has distortion {camera.distortion}, not {distortion}: set "
+                    "the pilot's camera.distortion, and the argument distortion of sensor_frames"
+                )
             if role != "imu":
                 continue
             stamp = self.held.last["imu"].stamp_ns
@@ -81,10 +86,10 @@ class Bag:
             camera: Further ones, where the bag has the topic of the colour pictures.
         """
         self.held = HeldSamples(self.topics)
-        with OpenBag(self.path) as reader:
+        with contextlib.closing(OpenBag(self.path)) as reader:
             if any(each.topic == self.topics.color for each in reader.connections):
                 roles = (*roles, *camera)
-            chosen = self._connections(reader, roles)
+            chosen = {role: self._connection(reader, role, name) for role, name in self.topics.names(roles).items()}
             for connection, data in reader.messages(list(chosen.values())):
                 for role in (role for role, each in chosen.items() if each.topic == connection.topic):
                     try:
@@ -95,26 +100,16 @@ class Bag:
                     if self.held.add(role, value):
                         yield role
 
-    def _check_lens(self, distortion: tuple[float, ...]) -> None:
-        camera = self.held.camera
-        if camera is not None and not camera.has_lens(distortion):
-            raise ConfigError(
-                f"{self.path}: the lens of camera_info has distortion {camera.distortion}, not {distortion}: set the "
-                "pilot's camera.distortion, and the argument distortion of sensor_frames"
-            )
-
-    def _connections(self, reader: OpenBag, roles: tuple[str, ...]) -> dict[str, Connection]:
-        found = {}
-        for role, name in self.topics.names(roles).items():
-            connection = next((each for each in reader.connections if each.topic == name), None)
-            if connection is None:
-                near = sorted({each.topic for each in reader.connections if each.msgtype in ACCEPTED[role]})
-                hint = f"of such a type are {', '.join(near)}" if near else "no topic has such a type"
-                raise ConfigError(f"{self.path}: no topic {name} for {role} ({_names(role)}); {hint}")
-            if connection.msgtype not in ACCEPTED[role]:
-                kind = shown(connection.msgtype)
-                raise ConfigError(f"{self.path}: topic {name} for {role} has type {kind}, not {_names(role)}")
-            found[role] = connection
+    def _connection(self, reader: OpenBag, role: str, name: str) -> Connection:
+        """Connection of a topic; ConfigError where the bag has none, or one of another type."""
+        types = " or ".join(kind.replace("/msg/", "/") for kind in ACCEPTED[role])
+        found = next((each for each in reader.connections if each.topic == name), None)
+        if found is None:
+            near = sorted({each.topic for each in reader.connections if each.msgtype in ACCEPTED[role]})
+            hint = f"of such a type are {', '.join(near)}" if near else "no topic has such a type"
+            raise ConfigError(f"{self.path}: no topic {name} for {role} ({types}); {hint}")
+        if found.msgtype not in ACCEPTED[role]:
+            raise ConfigError(f"{self.path}: topic {name} for {role} has type {shown(found.msgtype)}, not {types}")
         return found
 
 
@@ -124,7 +119,7 @@ def sensor_frames(path: str | Path, topics: Topics | None = None) -> Iterator[Se
 
 
 def commands(frames: Iterable[SensorFrame], pilot: Pilot) -> Iterator[tuple[SensorFrame, Command]]:
-    """Each frame with the pilot's command, open loop: what the vehicle then did is in the next frame anyway.
+    """Each frame with the pilot's command, open loop: the next frame contains the recorded motion anyway.
 
     Args:
         frames: Of a bag, or any others.
@@ -136,7 +131,3 @@ def commands(frames: Iterable[SensorFrame], pilot: Pilot) -> Iterator[tuple[Sens
             pilot.prepare(frame.image)
             prepared = True
         yield frame, pilot.step(frame)
-
-
-def _names(role: str) -> str:
-    return " or ".join(name.replace("/msg/", "/") for name in ACCEPTED[role])

@@ -10,9 +10,8 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.ros import pictures, samples
-from ibvs_qp.ros.messages import BadMessage
-from ibvs_qp.ros.stamps import from_ros
-from ibvs_qp.ros.topics import Topics
+from ibvs_qp.ros.messages import BadMessage, from_ros
+from ibvs_qp.ros.topics import MOTION, Topics
 from ibvs_qp.validation.clock import LEAD_NS
 
 #: Colour and depth pictures that wait for their partner; they arrive within a frame of each other.
@@ -24,9 +23,9 @@ LATEST_NS = 1_000_000_000
 class HeldSamples:
     """Collects messages in the order of their arrival.
 
-    A frame has the last received sample of every sensor with its own stamp, whatever the order of the stamps: what is
-    late or stale is for the pilot to judge. Colour and depth are paired by the nearest stamps within ``pair_s``. A
-    message that cannot be used is left out and counted.
+    A frame has the last received sample of every sensor with its own stamp, whatever the order of the stamps: the
+    pilot checks their age. Colour and depth are paired by the nearest stamps within ``pair_s``. A message that cannot
+    be used is left out and counted.
 
     Attributes:
         last: Last sample of each role.
@@ -72,9 +71,9 @@ class HeldSamples:
 
     def frame(self, stamp_ns: int) -> SensorFrame | None:
         """Frame of a tick, with a picture that no frame had; None until every sensor was received."""
-        if any(role not in self.last for role in ("imu", "attitude", "wrench")):
+        if any(role not in self.last for role in MOTION):
             return None
-        inertial, attitude, wrench = (self.last[role] for role in ("imu", "attitude", "wrench"))
+        inertial, attitude, wrench = (self.last[role] for role in MOTION)
         return SensorFrame(
             stamp_ns=stamp_ns,
             attitude=attitude.values["attitude"],
@@ -122,15 +121,12 @@ class HeldSamples:
             return
         own.clear()
         other.clear()
-        color, depth = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
-        if self.camera is None:
+        (color_ns, rgb), (_, depth) = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
+        if (camera := self.camera) is None:
             raise BadMessage("no camera info yet")
-        self._complete(*color, depth[1], self.camera)
-
-    def _complete(self, stamp_ns: int, rgb: np.ndarray, depth: np.ndarray, camera: pictures.Camera) -> None:
         if self._topics.depth_registered and rgb.shape[:2] != depth.shape:
             raise BadMessage("colour and depth differ in size")
         if rgb.shape[:2] != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
             raise BadMessage("size is not that of camera_info")
-        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=stamp_ns)
+        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=color_ns)
         self.pairs += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,43 +23,31 @@ _METADATA = "metadata.yaml"
 
 
 class OpenBag:
-    """A bag as a context. Whatever the library raises becomes one line of ConfigError.
+    """A bag that is open until `close`; any error of the library becomes a ConfigError of one line.
 
     Attributes:
         connections: Topics with their types.
 
     Args:
         path: As of `ibvs_qp.ros.bag.Bag`.
+
+    Raises:
+        ConfigError: When it cannot be read, or is compressed as a whole.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-
-    def __enter__(self) -> OpenBag:
-        """Open it.
-
-        Raises:
-            ConfigError: When it cannot be read, or is compressed as a whole.
-        """
-        _check_files(self._path)
+        for file in [path / _METADATA, *sorted(path.iterdir())] if path.is_dir() else [path]:
+            open_regular(file, LARGEST_METADATA if file.name == _METADATA else LARGEST_DATA).close()
         store = typestore()  # names the extra where it is missing
-        try:
-            self._mode = _compression_mode(self._path)
-        except Exception as error:
-            raise self._unreadable(error) from None
+        with _one_line(path):
+            self._mode = _compression_mode(path)
         if self._mode == "file":
-            raise ConfigError(f"{self._path} is compressed as whole files; decompress them with 'ros2 bag convert'")
-        try:
-            self._reader = _opened(self._path)
+            raise ConfigError(f"{path} is compressed as whole files; decompress them with 'ros2 bag convert'")
+        with _one_line(path):
+            self._reader = _opened(path)
             self._reader.typestore.max_sequence_length = store.max_sequence_length
-        except Exception as error:
-            raise self._unreadable(error) from None
-        self.connections = list(self._reader.connections)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close it."""
-        self._reader.close()
+        self.connections, self.close = list(self._reader.connections), self._reader.close
 
     def deserialize(self, data: bytes, name: str) -> Any:
         """Decode a message by the bag's own definitions, or by ours where it has none."""
@@ -66,31 +55,18 @@ class OpenBag:
 
     def messages(self, connections: list[Connection]) -> Iterator[tuple[Connection, bytes]]:
         """Messages of some connections in the order of recording."""
-        stream = self._reader.messages(connections)
-        while True:
-            try:
-                connection, _, data = next(stream)
-                data = _zstd(data, LARGEST_UNPACKED) if self._mode == "message" else data
-            except StopIteration:
-                return
-            except Exception as error:
-                raise self._unreadable(error) from None
-            yield connection, data
+        with _one_line(self._path):
+            for connection, _, data in self._reader.messages(connections):
+                yield connection, _zstd(data, LARGEST_UNPACKED) if self._mode == "message" else data
 
-    def _unreadable(self, error: Exception) -> ConfigError:
+
+@contextlib.contextmanager
+def _one_line(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return ConfigError(f"{self._path} is no readable ROS 2 bag ({shown(reason)[1:-1]})")
-
-
-def _check_files(path: Path) -> None:
-    """Open every file of a bag before the library does: only regular ones, of bounded size."""
-    if not path.is_dir():
-        open_regular(path, LARGEST_DATA).close()
-        return
-    open_regular(path / _METADATA, LARGEST_METADATA).close()
-    for file in sorted(path.iterdir()):
-        if file.name != _METADATA:
-            open_regular(file, LARGEST_DATA).close()
+        raise ConfigError(f"{path} is no readable ROS 2 bag ({shown(reason)[1:-1]})") from None
 
 
 def _compression_mode(path: Path) -> str:

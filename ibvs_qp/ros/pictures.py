@@ -1,4 +1,4 @@
-"""``sensor_msgs/Image`` and ``CameraInfo`` to pictures and intrinsics, and back."""
+"""``sensor_msgs/Image`` and ``CameraInfo`` to pictures and intrinsics, and back; BadMessage for unusable ones."""
 
 from __future__ import annotations
 
@@ -8,18 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, BadMessage, message
-from ibvs_qp.ros.stamps import header
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, BadMessage, header, message
 from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
 
 #: Channels of the colour encodings, in the order red, green, blue.
-_COLOURS = {
-    "rgb8": (3, (0, 1, 2)),
-    "bgr8": (3, (2, 1, 0)),
-    "rgba8": (4, (0, 1, 2)),
-    "bgra8": (4, (2, 1, 0)),
-    "mono8": (1, (0, 0, 0)),
-}
+_RGB, _BGR = (0, 1, 2), (2, 1, 0)
+_COLOURS = {"rgb8": (3, _RGB), "bgr8": (3, _BGR), "rgba8": (4, _RGB), "bgra8": (4, _BGR), "mono8": (1, (0, 0, 0))}
 #: Numbers of the depth encodings, and their unit [m] (REP 118).
 _DEPTHS = {"16UC1": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
 #: Longest side of a picture [px].
@@ -28,20 +22,15 @@ LONGEST_SIDE = 4096
 LENS_MODELS = ("plumb_bob", "rational_polynomial")
 #: Largest difference of the coefficients of one lens [-].
 LENS_ERROR = 1e-6
+_FRAME = "camera_color_optical_frame"
 
 
 class Camera(NamedTuple):
-    """Camera of the raw pictures.
+    """Camera of the raw pictures."""
 
-    Attributes:
-        intrinsics: (fx, fy, cx, cy) [px].
-        shape: Height and width [px].
-        distortion: Coefficients of the lens in OpenCV's order.
-    """
-
-    intrinsics: tuple[float, float, float, float]
-    shape: tuple[int, int]
-    distortion: tuple[float, ...]
+    intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
+    shape: tuple[int, int]  # height and width [px]
+    distortion: tuple[float, ...]  # coefficients of the lens in OpenCV's order
 
     def has_lens(self, distortion: tuple[float, ...]) -> bool:
         """Whether the lens has these coefficients; missing ones are 0."""
@@ -50,11 +39,7 @@ class Camera(NamedTuple):
 
 
 def to_rgb(image: Any) -> np.ndarray:
-    """Colour, uint8 (H, W, 3).
-
-    Raises:
-        BadMessage: For another encoding, or a size that does not fit the data.
-    """
+    """Colour, uint8 (H, W, 3)."""
     if image.encoding not in _COLOURS:
         raise BadMessage("encoding is no colour of 8 bits")
     channels, order = _COLOURS[image.encoding]
@@ -63,11 +48,7 @@ def to_rgb(image: Any) -> np.ndarray:
 
 
 def to_depth(image: Any) -> np.ndarray:
-    """Depth [m], float32 (H, W), 0 where invalid.
-
-    Raises:
-        BadMessage: For another encoding, or a size that does not fit the data.
-    """
+    """Depth [m], float32 (H, W), 0 where invalid."""
     if image.encoding not in _DEPTHS:
         raise BadMessage("encoding is not 16UC1 or 32FC1")
     kind, unit = _DEPTHS[image.encoding]
@@ -79,11 +60,7 @@ def to_depth(image: Any) -> np.ndarray:
 
 
 def to_camera(info: Any) -> Camera:
-    """Camera of a ``sensor_msgs/CameraInfo``.
-
-    Raises:
-        BadMessage: Without a camera matrix, or when OpenCV has no such lens.
-    """
+    """Camera of a ``sensor_msgs/CameraInfo`` with a camera matrix and a lens model of OpenCV."""
     k = np.asarray(info.k, float)
     if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
         raise BadMessage("no camera matrix")
@@ -109,10 +86,9 @@ def from_intrinsics(intrinsics: tuple[float, ...], shape: tuple[int, ...], stamp
     """``sensor_msgs/CameraInfo`` of (fx, fy, cx, cy) [px] and a picture's shape, without distortion."""
     fx, fy, cx, cy = intrinsics
     k = np.array((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))
-    region = message("sensor_msgs/msg/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return message(
         CAMERA_INFO,
-        header=header(stamp_ns, "camera_color_optical_frame"),
+        header=header(stamp_ns, _FRAME),
         height=shape[0],
         width=shape[1],
         distortion_model="plumb_bob",
@@ -120,9 +96,6 @@ def from_intrinsics(intrinsics: tuple[float, ...], shape: tuple[int, ...], stamp
         k=k,
         r=np.eye(3).ravel(),
         p=np.insert(k, (3, 6, 9), 0.0),
-        binning_x=0,
-        binning_y=0,
-        roi=region,
     )
 
 
@@ -139,7 +112,7 @@ def _rows(image: Any, pixel_bytes: int) -> np.ndarray:
 def _image(pixels: np.ndarray, encoding: str, stamp_ns: int) -> Any:
     return message(
         IMAGE,
-        header=header(stamp_ns, "camera_color_optical_frame"),
+        header=header(stamp_ns, _FRAME),
         height=pixels.shape[0],
         width=pixels.shape[1],
         encoding=encoding,

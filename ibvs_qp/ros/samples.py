@@ -2,6 +2,7 @@
 
 ROS's messages are in front-left-up and east-north-up, PX4's in front-right-down and north-east-down
 (`ibvs_qp.axes`). ``linear_acceleration`` of ROS is what an accelerometer measures: +9.81 m/s^2 upwards at rest.
+A message with a number that is not finite, or whose sender marks the quantity as absent, raises BadMessage.
 """
 
 from __future__ import annotations
@@ -11,8 +12,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ibvs_qp.axes import swap_attitude, swap_vector
-from ibvs_qp.ros.messages import IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, BadMessage, message
-from ibvs_qp.ros.stamps import from_px4, from_ros, header
+from ibvs_qp.ros.messages import (
+    IMU,
+    SENSOR_COMBINED,
+    VEHICLE_ATTITUDE,
+    WRENCH,
+    BadMessage,
+    from_px4,
+    from_ros,
+    header,
+    message,
+)
 
 #: Largest difference of a quaternion's length from 1 [-].
 LENGTH_ERROR = 0.01
@@ -20,7 +30,6 @@ LENGTH_ERROR = 0.01
 ABSENT = -1.0
 #: PX4's RELATIVE_TIMESTAMP_INVALID: there is no accelerometer.
 NO_ACCELEROMETER = 0x7FFFFFFF
-_UNKNOWN = np.zeros(9)
 
 
 class Sample(NamedTuple):
@@ -31,61 +40,39 @@ class Sample(NamedTuple):
 
 
 def inertial(value: Any) -> Sample:
-    """Angular velocity and specific force.
-
-    Args:
-        value: ``sensor_msgs/Imu`` or ``px4_msgs/SensorCombined``.
-
-    Raises:
-        BadMessage: When a number is not finite, or the message marks one of both as absent.
-    """
+    """Angular velocity and specific force of a ``sensor_msgs/Imu`` or ``px4_msgs/SensorCombined``."""
     if value.__msgtype__ == SENSOR_COMBINED:
         if value.accelerometer_timestamp_relative == NO_ACCELEROMETER:
             raise BadMessage("accelerometer is invalid")
-        vectors = {"angular_velocity": value.gyro_rad, "specific_force": value.accelerometer_m_s2}
-        return Sample(from_px4(value.timestamp), {name: _finite(vector) for name, vector in vectors.items()})
-    if ABSENT in (value.angular_velocity_covariance[0], value.linear_acceleration_covariance[0]):
-        raise BadMessage("has no angular velocity or no linear acceleration")
-    values = {
-        "angular_velocity": swap_vector(_finite(_xyz(value.angular_velocity))),
-        "specific_force": swap_vector(_finite(_xyz(value.linear_acceleration))),
-    }
-    return Sample(from_ros(value.header.stamp), values)
+        stamp, rate, force = from_px4(value.timestamp), _finite(value.gyro_rad), _finite(value.accelerometer_m_s2)
+    else:
+        if ABSENT in (value.angular_velocity_covariance[0], value.linear_acceleration_covariance[0]):
+            raise BadMessage("has no angular velocity or no linear acceleration")
+        rate, force = (swap_vector(_finite(_xyz(each))) for each in (value.angular_velocity, value.linear_acceleration))
+        stamp = from_ros(value.header.stamp)
+    return Sample(stamp, {"angular_velocity": rate, "specific_force": force})
 
 
 def attitude(value: Any) -> Sample:
-    """Attitude of B in I.
-
-    Args:
-        value: ``px4_msgs/VehicleAttitude`` or ``sensor_msgs/Imu``.
-
-    Raises:
-        BadMessage: When it is no unit quaternion, or the message marks it as absent.
-    """
+    """Attitude of B in I of a ``px4_msgs/VehicleAttitude`` or ``sensor_msgs/Imu``."""
     if value.__msgtype__ == VEHICLE_ATTITUDE:
-        stamp, quaternion = from_px4(value.timestamp_sample), _unit(value.q)
-    else:
-        if value.orientation_covariance[0] == ABSENT:
-            raise BadMessage("has no orientation")
-        ros = value.orientation
-        stamp, quaternion = from_ros(value.header.stamp), swap_attitude(_unit((ros.w, ros.x, ros.y, ros.z)))
-    return Sample(stamp, {"attitude": quaternion})
+        return Sample(from_px4(value.timestamp_sample), {"attitude": _unit(value.q)})
+    if value.orientation_covariance[0] == ABSENT:
+        raise BadMessage("has no orientation")
+    ros = value.orientation
+    return Sample(from_ros(value.header.stamp), {"attitude": swap_attitude(_unit((ros.w, ros.x, ros.y, ros.z)))})
 
 
 def wrench(value: Any, axes: str, on: str) -> Sample:
-    """Raw wrench of the vehicle on its tool, FRD.
+    """Raw wrench of the vehicle on its tool, FRD, of a ``geometry_msgs/WrenchStamped``.
 
     Args:
-        value: ``geometry_msgs/WrenchStamped``.
+        value: The message.
         axes: "flu" or "frd", in which the sensor reports.
         on: "tool" if it reports the wrench of the vehicle on the tool, "vehicle" for the opposite.
-
-    Raises:
-        BadMessage: When a number is not finite.
     """
     vector = _finite((*_xyz(value.wrench.force), *_xyz(value.wrench.torque)))
-    vector = swap_vector(vector) if axes == "flu" else vector
-    return Sample(from_ros(value.header.stamp), {"wrench": vector if on == "tool" else -vector})
+    return Sample(from_ros(value.header.stamp), {"wrench": _convention(vector, axes, on)})
 
 
 def to_imu(stamp_ns: int, quaternion: np.ndarray, rate: np.ndarray, force: np.ndarray) -> Any:
@@ -95,20 +82,22 @@ def to_imu(stamp_ns: int, quaternion: np.ndarray, rate: np.ndarray, force: np.nd
         IMU,
         header=header(stamp_ns, "base_link"),
         orientation=message("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w),
-        orientation_covariance=_UNKNOWN,
         angular_velocity=_vector3(swap_vector(rate)),
-        angular_velocity_covariance=_UNKNOWN,
         linear_acceleration=_vector3(swap_vector(force)),
-        linear_acceleration_covariance=_UNKNOWN,
     )
 
 
 def to_wrench(stamp_ns: int, vector: np.ndarray, axes: str, on: str) -> Any:
     """``geometry_msgs/WrenchStamped`` of a raw wrench [N, N m], (6,); `wrench` restores it."""
-    vector = swap_vector(vector) if axes == "flu" else np.asarray(vector, float)
-    vector = vector if on == "tool" else -vector
+    vector = _convention(np.asarray(vector, float), axes, on)
     value = message("geometry_msgs/msg/Wrench", force=_vector3(vector[:3]), torque=_vector3(vector[3:]))
     return message(WRENCH, header=header(stamp_ns, "force_torque"), wrench=value)
+
+
+def _convention(vector: np.ndarray, axes: str, on: str) -> np.ndarray:
+    """A wrench in FRD on the tool in the sensor's axes and sign, or back."""
+    vector = swap_vector(vector) if axes == "flu" else vector
+    return vector if on == "tool" else -vector
 
 
 def _xyz(vector: Any) -> tuple[float, float, float]:
@@ -116,8 +105,7 @@ def _xyz(vector: Any) -> tuple[float, float, float]:
 
 
 def _vector3(vector: np.ndarray) -> Any:
-    x, y, z = vector.tolist()
-    return message("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
+    return message("geometry_msgs/msg/Vector3", **dict(zip("xyz", vector.tolist(), strict=True)))
 
 
 def _finite(vector: Any) -> np.ndarray:

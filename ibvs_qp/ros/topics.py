@@ -24,7 +24,7 @@ _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def check_name(field: str, name: str) -> None:
-    """Raise ConfigError for what is no absolute name of ROS 2."""
+    """Raise ConfigError if the name is not absolute in ROS 2."""
     if not _NAME.fullmatch(name):
         raise out_of_range(field, name, "", "a topic's name begins with / and has letters, digits and _")
 

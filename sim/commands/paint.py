@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import sys
 import time
 from pathlib import Path
@@ -101,7 +102,6 @@ class Paint:
         from sim.sensors.cameras import resolve_camera
 
         check_mujoco()
-        from ibvs_qp.recording import require_extra
         from sim.flight.jobs import OwnJob
         from sim.flight.options import FlightOptions, pilot_config, sized
         from sim.flight.preflight import check_job
@@ -115,7 +115,7 @@ class Paint:
         started = time.perf_counter()
         check_seed(self.seed)
         if self.log == "mcap":
-            require_extra()
+            importlib.import_module("ibvs_qp.recording")  # refused without the extra
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
         scene, world = scene_in_world(chosen, self.world)
         vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
@@ -174,7 +174,6 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
-        from ibvs_qp.recording.layouts import FOLDER as LAYOUTS
         from sim.evaluate.flight_table import false_claims, figure_table
         from sim.evaluate.metrics import compute_metrics
         from sim.evaluate.table import plain
@@ -210,7 +209,9 @@ class Paint:
             if folder.report.exists():
                 print(f"Report: {folder.report}")
             for file in folder.logs():
-                print(f"Log: {file}; layouts for Foxglove and Rerun: {LAYOUTS}")
+                from ibvs_qp.recording import FOXGLOVE_LAYOUT
+
+                print(f"Log: {file}; layout for Foxglove: {FOXGLOVE_LAYOUT}")
         if (false := false_claims(metrics)) and not interrupted:
             print(f"ibvs-qp: warning: {'; '.join(false)}", file=sys.stderr)
         if interrupted:

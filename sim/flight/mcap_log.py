@@ -14,11 +14,10 @@ from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.recording.messages import encode
-from ibvs_qp.recording.poses import WALL, pose_in_frame, quaternion, transform
 from ibvs_qp.recording.recorder import Recorder
-from ibvs_qp.recording.shapes import plate, vehicle_scene
+from ibvs_qp.recording.scene import WALL, box, pose_in_frame, quaternion, shapes, transform, vehicle_scene
 from ibvs_qp.recording.topics import POSE_NS, SHAPE_NS
-from ibvs_qp.recording.writer import Sink
+from ibvs_qp.recording.writer import LogWriter
 from sim.flight.surroundings import World
 from sim.world.readout import PLACES
 
@@ -96,7 +95,7 @@ class McapLog:
         self._recorder.close()
         return self._recorder.problem
 
-    def _write(self, sink: Sink, stamp_ns: int, truth: np.ndarray, thrusts: np.ndarray) -> None:
+    def _write(self, log: LogWriter, stamp_ns: int, truth: np.ndarray, thrusts: np.ndarray) -> None:
         """In the thread of the log."""
         part = {name: truth[place] for name, place in PLACES.items()}
         row = TruthTick(
@@ -110,20 +109,19 @@ class McapLog:
             friction_n=part["friction"],
             thrusts_n=thrusts,
         )
-        sink.write("/truth/state", encode(row), stamp_ns)
+        log.write("/truth/state", encode(row), stamp_ns)
         if stamp_ns - self._pose_ns < POSE_NS:
             return
         self._pose_ns = stamp_ns
         position = _FLIP @ (row.position_m - self._start)
-        turn = quaternion((_FLIP @ rotation_from_quaternion(row.attitude)).tolist())
-        frames = FrameTransforms()
-        transform(frames, WALL, TRUE_VEHICLE, position, turn, stamp_ns)
-        sink.write("/truth/tf", frames)
-        sink.write("/truth/pose", pose_in_frame(WALL, position, turn, stamp_ns))
+        turn = quaternion(_FLIP @ rotation_from_quaternion(row.attitude))
+        frame = transform(WALL, TRUE_VEHICLE, position, turn, stamp_ns)
+        log.write("/truth/tf", FrameTransforms(transforms=[frame]))
+        log.write("/truth/pose", pose_in_frame(WALL, position, turn, stamp_ns))
         if stamp_ns - self._shape_ns >= SHAPE_NS:
             self._shape_ns = stamp_ns
-            sink.write("/truth/vehicle", vehicle_scene(self._world.plant.vehicle, TRUE_VEHICLE, stamp_ns, _ROTOR))
-            sink.write("/truth/board", self._board(stamp_ns))
+            log.write("/truth/vehicle", vehicle_scene(self._world.plant.vehicle, TRUE_VEHICLE, stamp_ns, _ROTOR))
+            log.write("/truth/board", self._board(stamp_ns))
 
     def _board(self, stamp_ns: int) -> Any:
         geometry, board = self._world.geometry, self._world.scene.board
@@ -131,5 +129,5 @@ class McapLog:
         centre = _FLIP @ (np.array([0.5 * _THIN, *middle]) - self._start)
         axes = np.column_stack(((1.0, 0.0, 0.0), (0.0, *geometry.along), (0.0, *geometry.up)))
         size = _THIN, board.width_m, board.height_m
-        turn = quaternion((_FLIP @ axes @ np.diag((1.0, -1.0, 1.0))).tolist())
-        return plate(WALL, "true_board", centre, size, _BOARD, stamp_ns, turn)
+        turn = quaternion(_FLIP @ axes @ np.diag((1.0, -1.0, 1.0)))
+        return shapes(WALL, "true_board", stamp_ns, cubes=[box(centre, size, _BOARD, turn)])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.ros.messages import SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, encoded, message
+from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, encoded, message
+from ibvs_qp.ros.pictures import from_depth, from_intrinsics, from_rgb
 from ibvs_qp.ros.samples import to_wrench
 
 NOW = 1_700_000_000_000_000_000
@@ -32,25 +33,13 @@ class Queue:
 
 
 def combined(stamp_ns: int, **changes: object) -> bytes:
-    fields: dict[str, object] = {
-        "timestamp": stamp_ns // 1000,
-        "gyro_rad": np.zeros(3, np.float32),
-        "gyro_integral_dt": 4000,
-        "accelerometer_timestamp_relative": 0,
-        "accelerometer_m_s2": np.array([0, 0, -9.81], np.float32),
-        "accelerometer_integral_dt": 4000,
-        "accelerometer_clipping": 0,
-        "gyro_clipping": 0,
-        "accel_calibration_count": 0,
-        "gyro_calibration_count": 0,
-    }
+    fields = {"timestamp": stamp_ns // 1000, "accelerometer_m_s2": np.array([0, 0, -9.81], np.float32)}
     return encoded(message(SENSOR_COMBINED, **(fields | changes)), SENSOR_COMBINED)
 
 
 def attitude(stamp_ns: int) -> bytes:
-    q = np.array([1, 0, 0, 0], np.float32)
-    fields = {"timestamp": stamp_ns // 1000, "timestamp_sample": stamp_ns // 1000, "quat_reset_counter": 0}
-    return encoded(message(VEHICLE_ATTITUDE, q=q, delta_q_reset=np.zeros(4, np.float32), **fields), VEHICLE_ATTITUDE)
+    q, us = np.array([1, 0, 0, 0], np.float32), stamp_ns // 1000
+    return encoded(message(VEHICLE_ATTITUDE, q=q, timestamp=us, timestamp_sample=us), VEHICLE_ATTITUDE)
 
 
 def mode(armed: int, offboard: int, more: int = 10, stamp_ns: int = NOW) -> bytes:
@@ -59,3 +48,17 @@ def mode(armed: int, offboard: int, more: int = 10, stamp_ns: int = NOW) -> byte
 
 def wrench(stamp_ns: int) -> bytes:
     return encoded(to_wrench(stamp_ns, np.arange(6.0), "flu", "tool"), WRENCH)
+
+
+def color(stamp_ns: int, shape: tuple[int, int] = (4, 6)) -> bytes:
+    return encoded(from_rgb(np.zeros((*shape, 3), np.uint8), stamp_ns), IMAGE)
+
+
+def depth(stamp_ns: int, shape: tuple[int, int] = (4, 6)) -> bytes:
+    return encoded(from_depth(np.ones(shape, np.float32), stamp_ns), IMAGE)
+
+
+def camera_info(stamp_ns: int, shape: tuple[int, int] = (4, 6), lens: str = "plumb_bob") -> bytes:
+    info = from_intrinsics((9.0, 9.0, 2.0, 1.0), shape, stamp_ns)
+    info.distortion_model = lens
+    return encoded(info, CAMERA_INFO)

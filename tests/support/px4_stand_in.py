@@ -38,9 +38,8 @@ from ibvs_qp.ros.messages import (
     WRENCH,
     decoded,
     message,
-    typestore,
+    to_px4,
 )
-from ibvs_qp.ros.stamps import to_px4
 from ibvs_qp.ros.topics import Px4Topics
 
 #: Size, focal length [px] and principal point of the camera.
@@ -219,29 +218,14 @@ class StandIn:
                     SENSOR_COMBINED,
                     timestamp=us,
                     gyro_rad=vehicle.noisy(vehicle.omega, 1e-3).astype(np.float32),
-                    gyro_integral_dt=4000,
-                    accelerometer_timestamp_relative=0,
                     accelerometer_m_s2=force.astype(np.float32),
-                    accelerometer_integral_dt=4000,
-                    accelerometer_clipping=0,
-                    gyro_clipping=0,
-                    accel_calibration_count=0,
-                    gyro_calibration_count=0,
                 )
             )
             x, y, z, w = vehicle.attitude.as_quat()
             quaternion = vehicle.noisy((w, x, y, z), 3e-4)
             quaternion /= np.linalg.norm(quaternion)
-            self._attitude.write(
-                message(
-                    VEHICLE_ATTITUDE,
-                    timestamp=us,
-                    timestamp_sample=us,
-                    q=quaternion.astype(np.float32),
-                    delta_q_reset=np.zeros(4, np.float32),
-                    quat_reset_counter=0,
-                )
-            )
+            q = quaternion.astype(np.float32)
+            self._attitude.write(message(VEHICLE_ATTITUDE, timestamp=us, timestamp_sample=us, q=q))
         if self._ticks % 2 == 0:
             self._wrench.write(samples.to_wrench(stamp, vehicle.wrench(), "flu", "tool"))
         if self._ticks % 5 == 0:
@@ -275,9 +259,8 @@ class StandIn:
 
 
 def control_mode(us: int, *, armed: bool, offboard: bool) -> Any:
-    flags = [name for name, _ in typestore().fielddefs[CONTROL_MODE][1] if name.startswith("flag_")]
-    values = dict.fromkeys(flags, False) | {"flag_armed": armed, "flag_control_offboard_enabled": offboard}
-    return message(CONTROL_MODE, timestamp=us, source_id=14 if offboard else 2, **values)
+    flags = {"flag_armed": armed, "flag_control_offboard_enabled": offboard}
+    return message(CONTROL_MODE, timestamp=us, source_id=14 if offboard else 2, **flags)
 
 
 def main() -> None:

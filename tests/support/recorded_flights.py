@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 from recorded_inputs import recording
 
 from ibvs_qp.assured import Assured
@@ -44,3 +46,10 @@ def record(file: Path, case: str, kind: str, ticks: int | None = None) -> Record
             recorder.step(*given)
             recorder.writer.wait_for_room()
     return recorder
+
+
+def logged(file: Path) -> list[tuple[str, Any]]:
+    """Topic and content of every message, by MCAP's own reader."""
+    with open(file, "rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        return [(channel.topic, content) for _, channel, _, content in reader.iter_decoded_messages()]

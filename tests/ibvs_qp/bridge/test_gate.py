@@ -45,20 +45,17 @@ def test_ready_only_after_the_whole_check() -> None:
 
 @pytest.mark.parametrize("problem", [{"lost": ["imu"]}, {"missing": ["attitude: turned"]}, {"engaged": None}])
 def test_nothing_is_ready_with_a_problem(problem: dict) -> None:
-    flight = Flight()
-    assert flight.go(1000, **problem) is WAITING
+    assert Flight().go(1000, **problem) is WAITING
 
 
 def test_flies_when_px4_is_engaged_and_not_before(ready: Flight) -> None:
     assert ready.go(100) is READY
-    assert ready.go(engaged=True) is FLYING
-    assert ready.go(100, engaged=True) is FLYING
+    assert ready.go(engaged=True) is FLYING and ready.go(100, engaged=True) is FLYING
 
 
 def test_does_not_fly_when_px4_was_engaged_before(ready: Flight) -> None:
     flight = Flight()
-    assert flight.go(1000, engaged=True) is WAITING
-    assert "already" in flight.gate.reason
+    assert flight.go(1000, engaged=True) is WAITING and "already" in flight.gate.reason
     # Nor in the very tick in which something is missing.
     assert ready.go(engaged=True, lost=["imu"]) is WAITING
     assert ready.go(1000, engaged=True) is WAITING
@@ -68,19 +65,17 @@ def test_does_not_fly_when_px4_was_engaged_before(ready: Flight) -> None:
 def test_a_lost_link_stops_until_px4_left_offboard(ready: Flight, loss: dict) -> None:
     ready.go(engaged=True)
     assert ready.go(**loss) is STOPPED and "link lost" in ready.gate.reason
-    assert ready.go(1000, engaged=True) is STOPPED  # the link is back, but nobody asked
+    assert ready.go(1000, engaged=True) is STOPPED  # the link is back, but PX4 has not left Offboard mode
     assert ready.go(engaged=None) is STOPPED
     assert ready.go(engaged=False) is CHECKING
-    assert ready.go(20) is CHECKING
-    assert ready.go(10) is READY
+    assert (ready.go(20), ready.go(10)) == (CHECKING, READY)
 
 
 def test_the_operator_takes_over_and_gives_back(ready: Flight) -> None:
     ready.go(engaged=True)
     assert ready.go(engaged=False) is CHECKING
     assert ready.go(engaged=True) is WAITING  # switched back before the check: PX4 had no proof of life
-    assert ready.go(40, engaged=False) is READY
-    assert ready.go(engaged=True) is FLYING
+    assert (ready.go(40, engaged=False), ready.go(engaged=True)) == (READY, FLYING)
 
 
 def test_an_ended_flight_stops(ready: Flight) -> None:
@@ -90,7 +85,7 @@ def test_an_ended_flight_stops(ready: Flight) -> None:
 
 
 def test_no_sequence_flies_without_a_sound_second_of_check() -> None:
-    """Whatever comes: before every flight lie 0.1 s without a problem and without Offboard mode."""
+    """Before every flight there are 0.1 s without a problem and without Offboard mode."""
     rng = random.Random(0)
     for _ in range(200):
         flight, sound = Flight(), 0

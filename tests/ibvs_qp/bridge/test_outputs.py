@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,26 +29,29 @@ COMMAND = Command(
 NOW, SAMPLE = 5_004_999, 5_000_000  # ns
 
 
-def test_motors_in_px4s_order_with_thrust_as_share_of_full() -> None:
-    ((topic, value),) = Outputs(BridgeConfig(), VEHICLE).setpoints(COMMAND, SAMPLE, NOW).items()
+def motors(command: Command = COMMAND, vehicle: VehicleParams = VEHICLE, **curve: float) -> Any:
+    config = BridgeConfig(curve=RotorCurve(**curve))
+    ((topic, value),) = Outputs(config, vehicle).setpoints(command, SAMPLE, NOW).items()
     assert topic == "/fmu/in/actuator_motors"
+    return value
+
+
+def test_motors_in_px4s_order_with_thrust_as_share_of_full() -> None:
+    value = motors()
     np.testing.assert_allclose(value.control[:6], THRUSTS / 52.56, rtol=1e-6)
     assert np.isnan(value.control[6:]).all() and value.control.shape == (12,) and value.reversible_flags == 0
     assert (value.timestamp, value.timestamp_sample) == (5004, 5000)
 
 
-@pytest.mark.parametrize("curve", [RotorCurve(), RotorCurve(quadratic=0.5)])
-def test_full_command_is_the_full_thrust_of_the_vehicle_at_hand(curve: RotorCurve) -> None:
-    weaker = dataclasses.replace(VEHICLE, thrust_max_n=35.0)
-    command = dataclasses.replace(COMMAND, thrusts=np.full(6, 35.0))
-    ((_, value),) = Outputs(BridgeConfig(curve=curve), weaker).setpoints(command, SAMPLE, NOW).items()
+@pytest.mark.parametrize("quadratic", [0.0, 0.5])
+def test_full_command_is_the_full_thrust_of_the_vehicle_at_hand(quadratic: float) -> None:
+    weaker, command = (dataclasses.replace(VEHICLE, thrust_max_n=35.0), np.full(6, 35.0))
+    value = motors(dataclasses.replace(COMMAND, thrusts=command), weaker, quadratic=quadratic)
     np.testing.assert_allclose(value.control[:6], 1.0, rtol=1e-6)
 
 
 def test_the_curve_is_inverted_where_px4_does_not() -> None:
-    curve = RotorCurve(thrust_max_n=60.0, quadratic=0.7)
-    ((_, value),) = Outputs(BridgeConfig(curve=curve), VEHICLE).setpoints(COMMAND, SAMPLE, NOW).items()
-    u = value.control[:6].astype(float)
+    u = motors(thrust_max_n=60.0, quadratic=0.7).control[:6].astype(float)
     np.testing.assert_allclose(60.0 * (0.7 * u**2 + 0.3 * u), THRUSTS, rtol=1e-5)
 
 
@@ -62,28 +66,22 @@ def test_thrust_and_torque_are_bounded() -> None:
 @pytest.mark.parametrize(("output", "field"), [("motors", "direct_actuator"), ("thrust_and_torque",) * 2])
 def test_the_proof_of_life_names_the_kind(output: str, field: str) -> None:
     config = BridgeConfig(output=output, namespace="/uav_1")
-    value = Outputs(config, VEHICLE).alive(NOW)
-    flags = [name for name in vars(value) if getattr(value, name) is True]
-    assert flags == [field] and value.timestamp == 5004
+    ((topic, value),) = Outputs(config, VEHICLE).alive(NOW).items()
+    assert [name for name in vars(value) if getattr(value, name) is True] == [field] and value.timestamp == 5004
     names = publications(config)
-    assert all(topic.startswith("/uav_1/fmu/in/") for topic in names)
-    encoded(value, names["/uav_1/fmu/in/offboard_control_mode"])
+    assert topic == "/uav_1/fmu/in/offboard_control_mode"
+    assert all(name.startswith("/uav_1/fmu/in/") for name in names)
+    encoded(value, names[topic])
 
 
 def test_what_does_not_fit_the_vehicle_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"curve.thrust_max_n = 40.0 N .* at least 52.56 N"):
-        Outputs(BridgeConfig(curve=RotorCurve(thrust_max_n=40.0)), VEHICLE)
     unequal = dataclasses.replace(VEHICLE, thrust_max_n=(50.0, 50.0, 50.0, 50.0, 50.0, 40.0))
+    with pytest.raises(ConfigError, match=r"curve.thrust_max_n = 40.0 N .* at least 52.56 N"):
+        motors(thrust_max_n=40.0)
     with pytest.raises(ConfigError, match=r"curve.thrust_max_n = None N .* rotors of different thrust_max_n"):
-        Outputs(BridgeConfig(), unequal)
-    Outputs(BridgeConfig(curve=RotorCurve(thrust_max_n=50.0)), unequal)
-    for wrong in (
-        {"output": "pwm"},
-        {"domain_id": 233},
-        {"link_timeout_s": 0.5},
-        {"imu_type": "x"},
-        {"namespace": "uav_1"},
-        {"namespace": "/uav_1/"},
-    ):
-        with pytest.raises(ConfigError, match=next(iter(wrong))):
-            BridgeConfig(**wrong)
+        motors(vehicle=unequal)
+    motors(vehicle=unequal, thrust_max_n=53.0)
+    settings = {"output": "pwm", "domain_id": 233, "link_timeout_s": 0.5, "imu_type": "x"}
+    for name, wrong in (*settings.items(), ("namespace", "uav_1"), ("namespace", "/uav_1/")):
+        with pytest.raises(ConfigError, match=name):
+            BridgeConfig(**{name: wrong})

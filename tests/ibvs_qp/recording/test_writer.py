@@ -1,8 +1,7 @@
-"""The thread of the log: a killed process, a slow writer, a full disk, and a loop that notices none of it."""
+"""The thread of the log: a killed process, a slow writer, a full disk, and a loop that none of them disturbs."""
 
 from __future__ import annotations
 
-import re
 import signal
 import subprocess
 import sys
@@ -11,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
-from recorded_flights import flown, record
+from recorded_flights import flown, logged
 
 import ibvs_qp.recording.writer
 from ibvs_qp import HybridController
@@ -22,7 +19,7 @@ from ibvs_qp.recording import Recorder, read_log, replay
 from ibvs_qp.recording.writer import LogWriter
 
 ROOT = Path(__file__).parents[3]
-#: Steps a controller at 250 Hz and says how many ticks it has flown.
+#: Steps a controller at 250 Hz and prints the ticks so far.
 FLY = """
 import sys
 import numpy as np
@@ -51,6 +48,18 @@ run(tick)
 """
 
 
+class Waiting:
+    """A call that lasts until `go` is set."""
+
+    def __init__(self, writer: LogWriter) -> None:
+        self.started, self.go = threading.Event(), threading.Event()
+        assert writer.offer(self) and self.started.wait(10.0)
+
+    def __call__(self, log: Any) -> None:
+        self.started.set()
+        self.go.wait(60.0)
+
+
 def test_a_killed_process_leaves_nearly_all_ticks(tmp_path: Path) -> None:
     """At most 0.2 s are lost, and 97 % of 10 s and more are kept."""
     file = tmp_path / "a.mcap"
@@ -65,37 +74,25 @@ def test_a_killed_process_leaves_nearly_all_ticks(tmp_path: Path) -> None:
     rest = process.stdout.read().split("\n")
     flown_ticks = max([flown_ticks, *(int(line.split()[0]) for line in rest if len(line.split()) == 2)])
     process.wait()
-    flight = read_log(file)
-    result = replay(flight)
+    result = replay(read_log(file))
     kept = result.ticks / flown_ticks
     print(f"{result.ticks} of {flown_ticks} ticks kept ({kept:.2%})")
     assert result.same and not result.complete and result.missing == 0
-    assert kept > 0.97 and flown_ticks - result.ticks <= 60  # 0.2 s, and what the process did not print
-
-
-class Held:
-    """An encoder that waits."""
-
-    def __init__(self) -> None:
-        self.started, self.go = threading.Event(), threading.Event()
-
-    def __call__(self, sink: Any) -> None:
-        self.started.set()
-        self.go.wait(60.0)
+    assert kept > 0.97 and flown_ticks - result.ticks <= 60  # 0.2 s, and the ticks that were not printed
 
 
 def test_a_full_queue_drops_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ibvs_qp.recording.writer, "ROOM", 50)
     subject, inputs = flown("rotor_loss", "controller")
-    held, given = Held(), list(inputs)
+    given = list(inputs)
     with Recorder(tmp_path / "a.mcap", subject) as recorder:
         recorder.step(*given[0])
         recorder.writer.wait_for_room()
-        assert recorder.writer.offer(held) and held.started.wait(10.0)
+        waiting = Waiting(recorder.writer)
         for tick in range(1, 101):
             recorder.step(*given[tick])
         assert recorder.dropped == 50
-        held.go.set()
+        waiting.go.set()
         while recorder.writer._queue:
             pass
         for tick in range(101, 121):
@@ -103,36 +100,32 @@ def test_a_full_queue_drops_and_says_so(tmp_path: Path, monkeypatch: pytest.Monk
             recorder.writer.wait_for_room()
     result = replay(read_log(tmp_path / "a.mcap"))
     assert result.same and result.ticks == 51 and result.missing == 50 and result.complete
-    with open(tmp_path / "a.mcap", "rb") as stream:
-        messages = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
-    said = [message.message for _, channel, _, message in messages if channel.topic == "/log"]
-    assert any(re.match(r"50 entries are missing from here: the queue of the log was full", text) for text in said)
-    assert [message.dropped for _, channel, _, message in messages if channel.topic == "/control"][-1] == 50
+    messages = logged(tmp_path / "a.mcap")
+    notes = [content.message for topic, content in messages if topic == "/log"]
+    assert "50 entries are missing from here: the queue of the log was full" in notes
+    assert [content.dropped for topic, content in messages if topic == "/control"][-1] == 50
 
 
 def test_ticks_missing_at_the_end_are_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ibvs_qp.recording.writer, "ROOM", 20)
     subject, inputs = flown("rotor_loss", "controller")
-    held = Held()
     with Recorder(tmp_path / "a.mcap", subject) as recorder:
-        assert recorder.writer.offer(held) and held.started.wait(10.0)
+        waiting = Waiting(recorder.writer)
         for _, given in zip(range(30), inputs, strict=False):
             recorder.step(*given)
-        held.go.set()
+        waiting.go.set()
     result = replay(read_log(tmp_path / "a.mcap"))
     assert result.same and result.ticks == 20 and result.missing == 10
 
 
-def test_an_encoder_that_fails_ends_no_log(tmp_path: Path) -> None:
-    def fail(sink: Any) -> None:
+def test_a_call_that_fails_ends_no_log(tmp_path: Path) -> None:
+    def fail(log: Any) -> None:
         raise ZeroDivisionError("no such value")
 
     writer = LogWriter(tmp_path / "a.mcap", {}, dict)
-    assert writer.offer(fail) and writer.offer(lambda sink: sink.note(2, "x", "after"))
+    assert writer.offer(fail) and writer.offer(LogWriter.note, 2, "x", "after")
     writer.close()
-    with open(tmp_path / "a.mcap", "rb") as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        texts = [message.message for *_, message in reader.iter_decoded_messages()]
+    texts = [content.message for _, content in logged(tmp_path / "a.mcap")]
     assert texts == ["not written: ZeroDivisionError: no such value", "after"] and not writer.problem
 
 
@@ -140,13 +133,12 @@ def test_an_encoder_that_fails_ends_no_log(tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     subject, inputs = flown("rotor_loss", "controller")
     with Recorder(tmp_path / "a.mcap", subject) as recorder:
-        stream = recorder.writer._sink._stream
-        monkeypatch.setattr(recorder.writer._sink._writer, "_Writer__stream", open("/dev/full", "wb"))
+        monkeypatch.setattr(recorder.writer._writer, "_Writer__stream", open("/dev/full", "wb"))
         for _, given in zip(range(200), inputs, strict=False):
             assert recorder.step(*given).thrusts.all()
         recorder.close()
     assert "cannot write the log" in recorder.problem and "No space left" in recorder.problem
-    assert stream.closed
+    assert recorder.writer._stream.closed
 
 
 def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
@@ -159,7 +151,7 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("odd", [(), ("x",), (None, None), (1, 2, 3, 4), (object(), [])])
 def test_inputs_of_any_type_do_not_raise(tmp_path: Path, odd: tuple[Any, ...]) -> None:
-    """Beyond what the controller itself raises for a wrong number of arguments."""
+    """Except for the error of the controller at a wrong number of arguments."""
     for kind in ("controller", "assured", "pilot"):
         subject, _ = flown("rotor_loss", kind)
         with Recorder(tmp_path / f"{kind}.mcap", subject) as recorder:
@@ -175,8 +167,7 @@ def test_inputs_of_any_type_do_not_raise(tmp_path: Path, odd: tuple[Any, ...]) -
 
 
 def test_a_recorder_that_is_never_closed_ends_its_file(tmp_path: Path) -> None:
-    code = FLY.replace("return True", "return ticks < 50")
-    words = [sys.executable, "-c", code, str(tmp_path / "a.mcap")]
+    words = [sys.executable, "-c", FLY.replace("return True", "return ticks < 50"), str(tmp_path / "a.mcap")]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     result = replay(read_log(tmp_path / "a.mcap"))
@@ -188,9 +179,8 @@ def test_without_the_extra_one_line_names_it() -> None:
         "import sys\n"
         "sys.modules.update(dict.fromkeys(('mcap', 'mcap_protobuf', 'foxglove_schemas_protobuf')))\n"
         "from ibvs_qp.config.errors import ConfigError\n"
-        "import ibvs_qp.recording\n"
         "try:\n"
-        "    ibvs_qp.recording.Recorder\n"
+        "    import ibvs_qp.recording\n"
         "except ConfigError as error:\n"
         "    print(error)\n"
         "from sim.commands.cli import main\n"
@@ -202,14 +192,10 @@ def test_without_the_extra_one_line_names_it() -> None:
     assert done.stderr.count("ibvs-qp: error: MCAP logs need the extra log") == 2 and done.stderr.count("\n") == 2
 
 
-def test_the_record_helper_waits_for_the_writer(tmp_path: Path) -> None:
-    assert record(tmp_path / "a.mcap", "rotor_loss", "pilot", 400).dropped == 0
-
-
 def test_a_writer_that_does_not_finish_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ibvs_qp.recording.writer, "CLOSE_S", 0.05)
-    writer, held = LogWriter(tmp_path / "a.mcap", {}, dict), Held()
-    assert writer.offer(held) and held.started.wait(10.0)
+    writer = LogWriter(tmp_path / "a.mcap", {}, dict)
+    waiting = Waiting(writer)
     writer.close()
     assert "was not finished within 0.05 s" in writer.problem
-    held.go.set()
+    waiting.go.set()
