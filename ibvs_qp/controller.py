@@ -27,11 +27,10 @@ from ibvs_qp.model.reporting import (
 )
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.infeasible import program_faults
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.solution import AcceptedSolution
+from ibvs_qp.qp.problem import ProgramData, QpProblem
+from ibvs_qp.qp.solver import AcceptedSolution
 from ibvs_qp.tasks import (
     EffortTask,
     HeightTask,

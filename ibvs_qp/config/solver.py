@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, setting, validate
+
+#: Solvers by name: the files of ``ibvs_qp/qp/solvers``, not imported here because they load the libraries.
+SOLVERS = tuple(sorted(file.stem for file in (Path(__file__).parents[1] / "qp" / "solvers").glob("[!_]*.py")))
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolverSettings:
-    """OSQP and the acceptance test; the values are measured on recorded flights (docs/how_it_works/qp.md)."""
+    """Solver and acceptance test; the values are measured on recorded flights (docs/how_it_works/qp.md)."""
 
     max_iterations: int = setting(500, "deterministic deadline; an iteration takes about 0.5 us", low=1, high=100000)
     tolerance: float = setting(1e-6, "eps_abs; leaves at most 1e-3 N in the softest direction", low=1e-10, high=1e-1)
@@ -23,6 +28,9 @@ class SolverSettings:
     )
     scaling: int = setting(
         2, "Ruiz equilibration passes; without, or with ten, some ticks end at the cap", low=0, high=100
+    )
+    name: str = choice(
+        "osqp", "solver that is tried first at every tick; all but OSQP are of the extra `solvers`", SOLVERS
     )
     backend: str = choice(
         "python",
@@ -39,5 +47,7 @@ class SolverSettings:
     )
 
     def __post_init__(self) -> None:
-        """Validate."""
+        """Validate; only OSQP exists as C code."""
         validate(self)
+        if self.backend == "compiled" and self.name != "osqp":
+            raise out_of_range("name", self.name, "", "allowed with backend = 'compiled' is osqp")

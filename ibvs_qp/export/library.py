@@ -60,6 +60,8 @@ def _check(config: ControllerConfig, single: bool) -> None:
         raise ConfigError("vehicle.camera_turn_deg: the C library has no turned camera, so it must be (0, 0, 0) deg")
     if not config.thrust_rows:
         raise ConfigError("thrust_rows: the C library keeps the thrust limits in the program, so it must be true")
+    if config.solver.name != "osqp":
+        raise ConfigError(f"solver.name = {config.solver.name!r} is refused: the C library has osqp only")
     count = config.vehicle.geometry.count
     if single and count > WRENCH:
         raise ConfigError(

@@ -11,7 +11,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.export.binding import Structures
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.symbolic.literals import real, reals
+from ibvs_qp.qp.program_code import real, reals
 
 #: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
 #: of a tick on to the next ones.

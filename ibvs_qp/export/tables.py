@@ -14,7 +14,7 @@ from ibvs_qp.export.layout import c_name
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.symbolic.literals import real, reals, table
+from ibvs_qp.qp.program_code import real, reals, table
 from ibvs_qp.validation.fields import REFERENCE, Field, FieldTable, measurement_table
 
 

@@ -21,9 +21,9 @@ from ibvs_qp.estimation.stamps import FIRST_INTERVAL, LONGEST_INTERVAL
 from ibvs_qp.estimation.wall_distance import NEVER_S, Plane, Tick
 from ibvs_qp.model.inputs import CONTACT, TARGET, gravity_direction
 from ibvs_qp.model.model import Model
+from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import GatedSignals, Signals, places, stack
-from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Sensors that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
 ARRAYS = {

@@ -13,12 +13,10 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import ProgramData, QpProblem
 from ibvs_qp.qp.program_code import FOR_PYTHON, SHELL, write_program
-from ibvs_qp.qp.solution import AcceptedSolution, Tried
-from ibvs_qp.symbolic.compiler import compiler
-from ibvs_qp.symbolic.shared_library import shared_library
+from ibvs_qp.qp.solver import AcceptedSolution, Tried
+from ibvs_qp.symbolic.machine_code import compiler, shared_library
 
 #: How the code is translated: no contraction of products and sums, so the same bits as OSQP's Python extension.
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-w")
@@ -29,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class CompiledSolver:
-    """OSQP with one workspace for all ticks; see `ibvs_qp.qp.osqp` and ``ibvs_qp/qp/c/solve.c``.
+    """OSQP with one workspace for all ticks; see `ibvs_qp.qp.solvers.osqp` and ``ibvs_qp/qp/c/solve.c``.
 
     Args:
         library: The shared library of `solver_library`.

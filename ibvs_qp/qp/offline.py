@@ -10,8 +10,7 @@ import qpsolvers
 from scipy import sparse
 
 from ibvs_qp.config.errors import IbvsQpError
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import ProgramData, QpProblem
 
 #: Back ends that take dense matrices only.
 DENSE = ("daqp", "quadprog")

@@ -1,21 +1,22 @@
-"""Assembly of tasks and limits to one program of fixed sparsity, condensed to thrusts and slacks."""
+"""Assembly of tasks and limits to one program of fixed sparsity, condensed to thrusts and slacks, and its values."""
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.limits.limit import Limit
 from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
-from ibvs_qp.qp.row_check import check_rows
-from ibvs_qp.symbolic.bound_function import ArrayFunction
+from ibvs_qp.qp.solver import DenseProgram
+from ibvs_qp.symbolic.function import ArrayFunction, StepFunction
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
 
@@ -24,13 +25,6 @@ REDUNDANT_ABOVE = 6
 #: Excess over a limit that is no noise, over `limits.thrust_noise_n` [-]: far beyond its reach a push that is clipped
 #: tilts the vehicle.
 NO_NOISE = 5.0
-
-
-class ProgramPatterns(Protocol):
-    """Sparsity of a program: upper triangle of P, and A; enough for a solver."""
-
-    p_pattern: sparse.csc_matrix
-    a_pattern: sparse.csc_matrix
 
 
 class AffineRows:
@@ -112,7 +106,7 @@ class QpProblem:
         self.model = model
         self.task_rows: list[TaskRow] = [row for task in tasks for row in task.rows(model)]
         self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
-        check_rows(model, self.task_rows, self.limit_rows)
+        _check_rows(model, self.task_rows, self.limit_rows)
         soft = [place for place, row in enumerate(self.limit_rows) if row.slack_weight is not None]
         n, m, rows = model.rotors, len(soft), len(self.limit_rows)
 
@@ -187,3 +181,84 @@ def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
     column, row = sparsity.get_ccs()
     data = np.ones(sparsity.nnz())
     return sparse.csc_matrix((data, row, column), shape=sparsity.shape)
+
+
+def _check_rows(model: Model, tasks: Sequence[TaskRow], limits: Sequence[LimitRow]) -> None:
+    """Refuse rows that the program cannot contain.
+
+    A task and a limit may share a name ("yaw" is both); two tasks or two limits may not, because reports name rows.
+
+    Raises:
+        ConfigError: Naming the row and its fault.
+    """
+    _refuse_duplicates("task", [row.name for row in tasks])
+    _refuse_duplicates("limit", [row.name for row in limits])
+    for task in tasks:
+        _refuse_curved(model, f"task {task.name}", task.expression, target=task.target, weight=task.weight)
+    for limit in limits:
+        _refuse_curved(model, f"limit {limit.name}", limit.expression, lower=limit.lower, upper=limit.upper)
+        weight = limit.slack_weight
+        if weight is not None and not 0.0 < weight < math.inf:
+            allowed = "greater than 0 and finite, None if it is hard"
+            raise ConfigError(f"limit {limit.name}: slack_weight = {weight!r} is refused: {allowed}")
+
+
+def _refuse_duplicates(kind: str, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{kind} rows need unique names: {name!r} appears {names.count(name)} times")
+
+
+def _refuse_curved(model: Model, row: str, expression: ca.SX, **others: ca.SX) -> None:
+    unknown = ca.veccat(model.thrust, model.acceleration)
+    if ca.depends_on(ca.jacobian(expression, unknown), unknown):
+        raise ConfigError(f"{row}: its expression must be affine in the thrusts")
+    for what, symbol in others.items():
+        if ca.depends_on(ca.SX(symbol), unknown):
+            raise ConfigError(f"{row}: its {what} must not depend on the thrusts")
+
+
+class ProgramData:
+    """Values of one step's program, where the step function writes them.
+
+    Attributes:
+        p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
+        unlimited: Solution of the same program without any row of A, (variables,).
+        free: Thrusts without limits [N], (n,): `unlimited` before noise at the limits is clipped.
+        further: Further values of the problem, in their order.
+        point: Inputs and states of the step; `inputs` are views of it by name.
+    """
+
+    def __init__(self, problem: QpProblem, step: StepFunction) -> None:
+        self.p, self.q, self.a, self.lower, self.upper, self.unlimited, self.free, *self.further = step.extra
+        self._step = step  # owns the memory that the compiled function writes
+        self.point, self.inputs = step.point, step.inputs
+        self._problem, self._dense = problem, DenseProgram(problem)
+
+    @property
+    def beyond_limits(self) -> bool:
+        """Whether the thrusts without limits pass a thrust limit, by noise or by more."""
+        n = len(self.free)
+        return bool((self.free < self.lower[:n]).any() or (self.free > self.upper[:n]).any())
+
+    def hessian(self) -> np.ndarray:
+        """P in full, (variables, variables)."""
+        return self._dense.hessian(self.p)
+
+    def rows(self) -> np.ndarray:
+        """A in full, (rows, variables)."""
+        return self._dense.rows(self.a)
+
+    def limit_values(self, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Value, lower and upper bound of every limit row at given thrusts, in the row's own unit."""
+        value, lower, upper = self._problem.limit_values(self.point, thrusts)
+        return value, lower, upper
+
+
+class RecordedProgram(ProgramData):
+    """The program of recorded steps: set `point`, evaluate, read the values."""
+
+    def __init__(self, problem: QpProblem) -> None:
+        step = StepFunction(problem.model.signals, problem.values)
+        super().__init__(problem, step)
+        self.evaluate = step.evaluate

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.problem import ProgramData
 
 #: Solves the program of a tick and returns its variables; it is prepared for that tick, and only the call is timed.
 Call = Callable[[], np.ndarray]

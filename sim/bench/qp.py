@@ -11,7 +11,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.offline import installed_solvers, qpsolvers_problem, solve_offline
-from ibvs_qp.symbolic.compiler import compiler
+from ibvs_qp.symbolic.machine_code import compiler
 from sim.bench.direct import direct_solvers
 from sim.bench.reference_rival import mink_row
 from sim.bench.stages import stage_medians

@@ -8,7 +8,7 @@ import math
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.sensors.imu_errors import ImuErrors
 from sim.sensors.sample_clock import SampleClock
 from sim.sensors.small_turns import multiply

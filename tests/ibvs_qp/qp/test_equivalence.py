@@ -29,7 +29,7 @@ from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction
 from ibvs_qp.model.thrust_window import LEAST_GAP, thrust_window
 from ibvs_qp.qp.explain import active_limits
 from ibvs_qp.qp.offline import installed_solvers, solve_offline
-from ibvs_qp.qp.solution import AcceptedSolution
+from ibvs_qp.qp.solver import AcceptedSolution
 
 RNG = np.random.default_rng
 LAST = np.array([11.0, 12.0, 10.5, 11.5, 12.5, 11.2])
@@ -446,7 +446,7 @@ def test_the_price_of_every_kind_of_limit_is_the_slope_of_the_cost(name: str, si
     tight[row] = at - sign * 0.5  # half a unit away from what the tasks want
     solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
     assert solution is not None
-    (active,) = [limit for limit in active_limits(controller.problem, *solution) if limit.name == name]
+    (active,) = [limit for limit in active_limits(controller.problem, solution.x, solution.y) if limit.name == name]
     assert active.side == side
     step = 1e-3
     slope = (optimal_cost(controller, row, side, step) - optimal_cost(controller, row, side, -step)) / (2.0 * step)
