@@ -8,6 +8,7 @@ from pathlib import Path
 import casadi as ca
 
 from ibvs_qp.export.analytic_terms import analytic_terms
+from ibvs_qp.model.inputs import setting_values
 from ibvs_qp.model.tick import tick_signals
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.symbolic.signals import Signals, stack
@@ -52,7 +53,10 @@ class TickCode:
     """
 
     def __init__(self, problem: QpProblem) -> None:
-        self.signals, (_, *results) = tick_signals(problem.model, [*problem.values, *analytic_terms(problem.model)])
+        values = setting_values(problem.model.config).items()
+        constants = {name: value for name, value in values if not name.startswith("gains.")}
+        extra = [*problem.values, *analytic_terms(problem.model)]
+        self.signals, (_, *results) = tick_signals(problem.model, extra, constants)
         self.signals.outputs = {name: self.signals.outputs[name] for name in OUTPUTS}
         _drop_states(self.signals, [*self.signals.outputs.values(), *results])
         states = ca.densify(self.signals.next_states)

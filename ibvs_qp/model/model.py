@@ -22,7 +22,7 @@ from ibvs_qp.model.camera_view import camera_view
 from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
-from ibvs_qp.model.inputs import Body, Contact, Line, Target, gain_inputs
+from ibvs_qp.model.inputs import RUN_TIME, Body, Contact, Line, Target, setting_inputs
 from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_planes, push_reach, push_reference
 from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
@@ -46,10 +46,10 @@ class Model:
     feed-forward. Rows are written in `thrust` and `acceleration`; `ibvs_qp.qp.problem` eliminates the acceleration.
 
     Args:
-        config: Everything it needs; its gains are inputs ``gains.line_kp`` and so on.
+        config: Everything it needs; its gains, weights and limits are inputs ``gains.line_kp`` and so on.
 
     Attributes:
-        gains: The feedback gains, symbols under the names of `ibvs_qp.config.Gains`.
+        gains, weights, limits: Symbols under the names of the settings (`ibvs_qp.model.inputs.RUN_TIME`).
         thrust: u [N], (n,).
         acceleration: nu_dot in B [m/s^2, rad/s^2], (6,).
         acceleration_now: nu_dot of the lagged thrusts; acceleration_commanded: of the last command, (6,).
@@ -77,7 +77,7 @@ class Model:
         body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
         self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
         self.contact_weight = signals.input("contact_weight")
-        self.gains = gain_inputs(signals)
+        self.gains, self.weights, self.limits = (setting_inputs(signals, section) for section in RUN_TIME)
 
         self.rotors = vehicle.geometry.count
         self.effectiveness = control_effectiveness(vehicle.geometry)

@@ -9,7 +9,8 @@ are one CasADi function, for Python and for the generated C code.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import casadi as ca
 
@@ -92,10 +93,18 @@ class TickFunction(StepFunction):
         self.inputs = {name: self.point[place] for name, place in places(model.signals.inputs).items()}
 
 
-def tick_signals(model: Model, extra: Sequence[ca.SX] = ()) -> tuple[Signals, list[ca.SX]]:
-    """The tick's signals, and its further results: the point of the law, then ``extra``."""
+def tick_signals(
+    model: Model, extra: Sequence[ca.SX] = (), constants: Mapping[str, float] = MappingProxyType({})
+) -> tuple[Signals, list[ca.SX]]:
+    """The tick's signals, and its further results: the point of the law, then ``extra``.
+
+    Args:
+        model: The law.
+        extra: Further results.
+        constants: Inputs of the law that are numbers of the equations instead, by name.
+    """
     law, signals = model.signals, Signals()
-    at_present = _at_present(signals, model.config)
+    at_present = _at_present(signals, model.config) | {name: ca.SX(value) for name, value in constants.items()}
     inputs = [
         at_present[name] if name in at_present else signals.input(name, symbol.numel())
         for name, symbol in law.inputs.items()

@@ -136,12 +136,12 @@ class TickReplay:
         thrusts = x[: problem.model.rotors]
         tasks = tuple(task_reports(problem, data, thrusts))
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
-        slack = x[len(thrusts) :]
-        slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
+        slack, slack_weights = x[len(thrusts) :], data.hessian().diagonal()[len(thrusts) :]
+        slack_cost = 0.5 * float(slack @ (slack_weights * slack))
         total = float(cost.sum()) + slack_cost or 1.0
         limits = sorted(active_limits(problem, x, y), key=lambda limit: -limit.price)
-        weights = {row.name: row.slack_weight or 0.0 for row in problem.limit_rows}
-        paid = (0.5 * weights[limit.name] * limit.slack**2 / total for limit in limits)
+        weights = dict(zip(problem.variable_names[len(thrusts) :], slack_weights, strict=True))
+        paid = (0.5 * weights.get(f"slack_{limit.name}", 0.0) * limit.slack**2 / total for limit in limits)
         effectiveness = problem.model.effectiveness
         return Explanation(
             thrusts=thrusts,

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.limits.limit import Limit
-from ibvs_qp.model.inputs import clamp
+from ibvs_qp.limits.limit import WIDE, Limit
+from ibvs_qp.model.inputs import clamp, setting_values
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.qp.solver import DenseProgram
@@ -96,6 +98,7 @@ class QpProblem:
             of the thrusts without limits; extra results of the step function.
         report: Function of point (inputs and states) and thrusts: achieved and target values of every task row, and
             weights, (rows,) each.
+        switches: Names of the settings that switch its limits.
         row_slack: Column of every row's slack in x, -1 where the row is hard, (rows,).
 
     Raises:
@@ -104,9 +107,11 @@ class QpProblem:
 
     def __init__(self, model: Model, tasks: Sequence[Task], limits: Sequence[Limit]) -> None:
         self.model = model
-        self.task_rows: list[TaskRow] = [row for task in tasks for row in task.rows(model)]
-        self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
-        _check_rows(model, self.task_rows, self.limit_rows)
+        self.task_rows: list[TaskRow] = [row for task in tasks for row in _checked_tasks(model, task)]
+        self.limit_rows: list[LimitRow] = [row for limit in limits for row in _checked_limits(model, limit)]
+        _refuse_duplicates("task", [row.name for row in self.task_rows])
+        _refuse_duplicates("limit", [row.name for row in self.limit_rows])
+        self.switches = frozenset(limit.switch_setting for limit in limits)
         soft = [place for place, row in enumerate(self.limit_rows) if row.slack_weight is not None]
         n, m, rows = model.rotors, len(soft), len(self.limit_rows)
 
@@ -119,8 +124,8 @@ class QpProblem:
         free = _unlimited_thrusts(hessian, gradient)
         noise = _noise_beyond_limits(model, free)
         gradient -= hessian @ noise
-        slack_weights = [float(self.limit_rows[place].slack_weight or 0.0) for place in soft]
-        p = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(ca.DM(slack_weights)))) if m else hessian)
+        slack_weights = [ca.SX(self.limit_rows[place].slack_weight) for place in soft]
+        p = ca.triu(ca.diagcat(hessian, *slack_weights))
         q = ca.vertcat(gradient, ca.DM.zeros(m))
 
         bounds = AffineRows(model, ca.vertcat(*(row.expression for row in self.limit_rows)))
@@ -167,8 +172,8 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
     None for a rotor whose limit is reported (a weak one, say), where an error would last, and none with redundant
     rotors, which give noise up at no cost of the wrench.
     """
-    most = model.config.limits.thrust_noise_n
-    if not model.config.thrust_rows or most == 0.0 or model.rotors > REDUNDANT_ABOVE:
+    most = model.limits.thrust_noise_n
+    if not model.config.thrust_rows or model.rotors > REDUNDANT_ABOVE:
         return ca.SX(model.rotors, 1)
     (low, high), (floor, ceiling) = model.thrust_limits, model.thrust_box
     own = ca.logic_and(low <= floor, high >= ceiling)
@@ -183,24 +188,36 @@ def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
     return sparse.csc_matrix((data, row, column), shape=sparsity.shape)
 
 
-def _check_rows(model: Model, tasks: Sequence[TaskRow], limits: Sequence[LimitRow]) -> None:
-    """Refuse rows that the program cannot contain.
+def _checked_tasks(model: Model, task: Task) -> list[TaskRow]:
+    """Rows of a task; of a user's own task, refused where the program cannot contain them."""
+    rows = task.rows(model)
+    for row in rows if _is_own(task) else ():
+        _refuse_curved(model, f"task {row.name}", row.expression, target=row.target, weight=row.weight)
+    return rows
 
-    A task and a limit may share a name ("yaw" is both); two tasks or two limits may not, because reports name rows.
 
-    Raises:
-        ConfigError: Naming the row and its fault.
-    """
-    _refuse_duplicates("task", [row.name for row in tasks])
-    _refuse_duplicates("limit", [row.name for row in limits])
-    for task in tasks:
-        _refuse_curved(model, f"task {task.name}", task.expression, target=task.target, weight=task.weight)
-    for limit in limits:
-        _refuse_curved(model, f"limit {limit.name}", limit.expression, lower=limit.lower, upper=limit.upper)
-        weight = limit.slack_weight
+def _checked_limits(model: Model, limit: Limit) -> list[LimitRow]:
+    """Rows of a limit, far away while its switch is off; of a user's own limit, refused likewise."""
+    rows = limit.rows(model)
+    for row in rows if _is_own(limit) else ():
+        _refuse_curved(model, f"limit {row.name}", row.expression, lower=row.lower, upper=row.upper)
+        weight = row.slack_weight
         if weight is not None and not 0.0 < weight < math.inf:
             allowed = "greater than 0 and finite, None if it is hard"
-            raise ConfigError(f"limit {limit.name}: slack_weight = {weight!r} is refused: {allowed}")
+            raise ConfigError(f"limit {row.name}: slack_weight = {weight!r} is refused: {allowed}")
+    section, _, switch = (limit.switch_setting or "").partition(".")
+    if section != "limits":
+        return rows
+    on = getattr(model.limits, switch)
+    return [
+        dataclasses.replace(row, lower=ca.if_else(on, row.lower, -WIDE), upper=ca.if_else(on, row.upper, WIDE))
+        for row in rows
+    ]
+
+
+def _is_own(rows: Task | Limit) -> bool:
+    """Whether a task or limit is not one of the package, whose rows the tests check."""
+    return not type(rows).__module__.startswith("ibvs_qp.")
 
 
 def _refuse_duplicates(kind: str, names: list[str]) -> None:
@@ -216,6 +233,29 @@ def _refuse_curved(model: Model, row: str, expression: ca.SX, **others: ca.SX) -
     for what, symbol in others.items():
         if ca.depends_on(ca.SX(symbol), unknown):
             raise ConfigError(f"{row}: its {what} must not depend on the thrusts")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    r"""The program of one tick, :math:`\min \tfrac12 x^T P x + q^T x,\; l \le A x \le u` with x = (thrusts, slacks).
+
+    Attributes:
+        P, q, A, lower, upper: Its matrices in full.
+        variables: Names of the entries of x: thrusts, then slacks of the soft limits.
+        limits: Names of the rows of A.
+        tasks: Names of the least-squares rows that add up to P and q.
+        weights: Weights of the task rows at this tick, (tasks,).
+    """
+
+    P: np.ndarray
+    q: np.ndarray
+    A: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    variables: tuple[str, ...]
+    limits: tuple[str, ...]
+    tasks: tuple[str, ...]
+    weights: np.ndarray
 
 
 class ProgramData:
@@ -249,6 +289,21 @@ class ProgramData:
         """A in full, (rows, variables)."""
         return self._dense.rows(self.a)
 
+    def program(self) -> Program:
+        """A copy of the program with its names."""
+        problem = self._problem
+        return Program(
+            P=self.hessian(),
+            q=self.q.copy(),
+            A=self.rows(),
+            lower=self.lower.copy(),
+            upper=self.upper.copy(),
+            variables=problem.variable_names,
+            limits=problem.row_names,
+            tasks=tuple(name for name, _ in problem.task_names),
+            weights=problem.report(self.point, self.free)[2],
+        )
+
     def limit_values(self, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Value, lower and upper bound of every limit row at given thrusts, in the row's own unit."""
         value, lower, upper = self._problem.limit_values(self.point, thrusts)
@@ -262,3 +317,5 @@ class RecordedProgram(ProgramData):
         step = StepFunction(problem.model.signals, problem.values)
         super().__init__(problem, step)
         self.evaluate = step.evaluate
+        for name, value in setting_values(problem.model.config).items():
+            step.inputs[name][:] = value

@@ -69,6 +69,7 @@ class StepFunction:
     Attributes:
         inputs, states, outputs: Views by name; write inputs with ``[:] =``, outputs hold after `evaluate`.
         point: All inputs and states of the last evaluation in one column: together they reproduce the step.
+        memory: All numbers of the step; a copy of it restores an earlier step.
         results: All outputs in one column; starts: place of the first entry of each.
         extra: Arrays of the additional results, in their order.
     """
@@ -79,10 +80,11 @@ class StepFunction:
         function = ca.Function("step", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
         if to_machine_code:
             function = machine_code(function)
-        count = function.numel_in(0)
-        self.point = np.zeros(count + function.numel_in(1))
+        count, sizes = function.numel_in(0), [function.numel_out(index) for index in range(function.n_out())]
+        ends = np.cumsum([count + function.numel_in(1), *sizes])
+        self.memory = np.zeros(ends[-1])
+        self.point, *arrays = np.split(self.memory, ends[:-1])
         self.values, self._state = self.point[:count], self.point[count:]
-        arrays = [np.zeros(function.numel_out(index)) for index in range(function.n_out())]
         self._next, self._sum, self.results, *self.extra = arrays
         self._bound = BoundFunction(function, [self.values, self._state], arrays)
         self.evaluate = self._bound.evaluate
