@@ -8,6 +8,7 @@ solves the program with OSQP and reports what tasks and limits did. The equation
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -20,6 +21,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.inputs import equations
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import (
     clipped_command,
@@ -78,8 +80,20 @@ def qp_problem(
     limits: Sequence[Limit] = (),
     kind: type[QpProblem] = QpProblem,
 ) -> QpProblem:
-    """The program of a configuration: the shipped tasks and limits and further ones."""
-    return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    """The program of a configuration: the shipped tasks and limits and further ones.
+
+    Without further ones the equations are built once for all configurations that share them (`equations`).
+    """
+    if tasks or limits:
+        return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    problem = copy.copy(_shipped_problem(kind, equations(config)))
+    problem.model = problem.model.of(config)
+    return problem
+
+
+@functools.lru_cache(maxsize=8)
+def _shipped_problem(kind: type[QpProblem], config: ControllerConfig) -> QpProblem:
+    return kind(Model(config), default_tasks(config), default_limits(config))
 
 
 class HybridController(CheckedLaw):

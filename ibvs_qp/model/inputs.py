@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
 
-from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, Weights
+from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, SolverSettings, Weights
 from ibvs_qp.symbolic.signals import Signals
 
 #: Gain of an integral in the division that bounds it: one of zero has a bound as well.
@@ -196,6 +196,13 @@ def gravity_direction(attitude: ca.SX) -> ca.SX:
     """Unit gravity in B, (3,), by a quaternion; see `ibvs_qp.frames.down_in_body`."""
     w, x, y, z = ca.vertsplit(attitude)
     return ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+
+
+def equations(config: ControllerConfig) -> ControllerConfig:
+    """What determines the equations: a configuration with the defaults of all that are inputs of the tick."""
+    switches = [name for name in RUN_TIME["limits"] if name.endswith("_barrier")]
+    limits = LimitSettings(**{name: getattr(config.limits, name) for name in (*STRUCTURAL, *switches)})
+    return replace(config, gains=Gains(), weights=Weights(), limits=limits, solver=SolverSettings())
 
 
 def setting_inputs(signals: Signals, section: str) -> Any:

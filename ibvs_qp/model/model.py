@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -66,13 +67,14 @@ class Model:
         bias_wrench: h [N, N m], (6,).
         reach: Largest push that the thrust limits allow [N].
         push_reference: Push reference within reach [N].
+        code: Functions of the equations, common to all copies.
         integrate: 1 while no limit takes wrench away: anti-windup of all integrals.
         integrate_in_plane: The same for integrals in the wall plane, which also stop while the tip is stuck.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
         self.config, self.signals, self.parameters = config, Signals(), list[Parameter]()
-        self._cache: dict[tuple[object, ...], object] = {}
+        self._cache, self.code = dict[tuple[object, ...], object](), dict[tuple[object, ...], Any]()
         vehicle, signals = config.vehicle, self.signals
         body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
         self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
@@ -116,6 +118,19 @@ class Model:
         trim.update(planes, self.body, self.contact, target)
         self.push_reference = push_reference(signals, config, self.body, self.contact, target, self.reach)
         self._name_outputs()
+
+    def of(self, config: ControllerConfig) -> Model:
+        """A copy for a configuration with the same equations; what is declared in the copy stays in it."""
+        other = copy.copy(self)
+        other.config, other.signals, other.parameters = config, self.signals.copy(), list(self.parameters)
+        other._cache = dict(self._cache)
+        return other
+
+    def built(self, key: tuple[object, ...], build: Callable[[], T]) -> T:
+        """Function of the complete equations, built once for all copies (`of`)."""
+        if key not in self.code:
+            self.code[key] = build()
+        return self.code[key]
 
     def _stuck(self) -> ca.SX:
         # The body's velocity, not the tip's: a tip creeping at high friction must not stop the integral that frees it.

@@ -72,12 +72,22 @@ class StepFunction:
         memory: All numbers of the step; a copy of it restores an earlier step.
         results: All outputs in one column; starts: place of the first entry of each.
         extra: Arrays of the additional results, in their order.
+
+    Args:
+        signals: The registry, complete.
+        extra: Additional results.
+        to_machine_code: Whether a compiler translates it.
+        function: That of the same signals and results, complete, to spare its construction.
     """
 
-    def __init__(self, signals: Signals, extra: Sequence[ca.SX] = (), to_machine_code: bool = False) -> None:
-        next_states = ca.densify(signals.next_states)
-        results = [next_states, ca.sum1(next_states), stack(signals.outputs), *(ca.densify(entry) for entry in extra)]
-        function = ca.Function("step", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
+    def __init__(
+        self,
+        signals: Signals,
+        extra: Sequence[ca.SX] = (),
+        to_machine_code: bool = False,
+        function: ca.Function | None = None,
+    ) -> None:
+        function = function or step_function(signals, extra)
         if to_machine_code:
             function = machine_code(function)
         count, sizes = function.numel_in(0), [function.numel_out(index) for index in range(function.n_out())]
@@ -104,3 +114,10 @@ class StepFunction:
         """Move on to the states that the last evaluation computed; they stay where one of them is not finite."""
         if math.isfinite(self._sum[0]):
             self._state[:] = self._next
+
+
+def step_function(signals: Signals, extra: Sequence[ca.SX] = ()) -> ca.Function:
+    """Inputs and states to next states, their sum, outputs, and additional results, each in one column."""
+    next_states = ca.densify(signals.next_states)
+    results = [next_states, ca.sum1(next_states), stack(signals.outputs), *(ca.densify(entry) for entry in extra)]
+    return ca.Function("step", [stack(signals.inputs), stack(signals.states)], ca.cse(results))
