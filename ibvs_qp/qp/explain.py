@@ -8,12 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
+from ibvs_qp.command import ActiveLimit, Outcome, TaskReport, TaskReports
+from ibvs_qp.config import SolverSettings
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.problem import ProgramData, QpProblem, RecordedProgram
-from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, Solver, make_solver
+
+#: Iterations of a solver without a deadline.
+LONG = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,16 +105,18 @@ class TickReplay:
 
     Args:
         problem: The program.
-        solver: Back end of qpsolvers that solves it; None for the exact solver.
+        solver: Name of the solver (`solver.name`); None for the exact one.
 
     Attributes:
         conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
     """
 
     def __init__(self, problem: QpProblem, solver: str | None = None) -> None:
-        self._problem, self._solver = problem, solver
-        self._data = RecordedProgram(problem)
+        self._problem, self._data = problem, RecordedProgram(problem)
         self._exact = ExactSolver(problem)
+        self._solver: Solver = self._exact
+        if solver is not None:
+            self._solver = make_solver(problem, SolverSettings(name=solver, max_iterations=LONG))
         self.conflict: tuple[str, ...] = ()
 
     def explain(self, point: np.ndarray) -> Explanation | None:
@@ -128,11 +134,12 @@ class TickReplay:
             raise ConfigError(f"a recorded tick of {len(point)} numbers is refused: {wanted}")
         data.point[:] = point
         data.evaluate()
-        solution, self.conflict = self._solve(), ()
-        if solution is None:
+        self._solver.reset()
+        solution, self.conflict = self._solver.solve(data.p, data.q, data.a, data.lower, data.upper), ()
+        if solution is None or solution.status is not Outcome.SOLVED:
             self.conflict = conflicting_rows(problem, data)
             return None
-        x, y = solution
+        x, y = solution.x, solution.y
         thrusts = x[: problem.model.rotors]
         tasks = tuple(task_reports(problem, data, thrusts))
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
@@ -188,15 +195,6 @@ class TickReplay:
             until = event if at.end == row else f"{every[at.end]} {event}"
             ranges.append(LimitRange(change_low=at.lower, change_high=at.upper, cost_fall=at.fall, until=until))
         return tuple(ranges)
-
-    def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
-        data = self._data
-        if self._solver is None:
-            exact = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
-            return None if exact is None else (exact.x, exact.y)
-        from ibvs_qp.qp.offline import solve_offline  # qpsolvers loads every installed back end
-
-        return solve_offline(self._problem, data, self._solver)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,14 +20,12 @@ from allocation.geometry import TAROT_T960
 from ibvs_qp.analytic import analytic_thrusts
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, Weights
-from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction_matrix
 from ibvs_qp.model.thrust_window import LEAST_GAP, thrust_window
 from ibvs_qp.qp.explain import active_limits
-from ibvs_qp.qp.offline import installed_solvers, solve_offline
 from ibvs_qp.qp.solver import AcceptedSolution
 
 RNG = np.random.default_rng
@@ -228,33 +225,6 @@ def test_solutions_that_fly_meet_the_optimality_conditions(flight: Flight) -> No
     assert np.quantile(dual, 0.99) < 5e-3 and dual.max() < 2e-2
     assert outside.max() < 2e-3
     assert flight.outcomes.count(Outcome.SOLVED) >= 0.999 * len(flight.outcomes)
-
-
-def random_programs(count: int, window: tuple[float, float]) -> Iterator[tuple[HybridController, tuple]]:
-    """Programs with rows that bind, and the exact solution of each."""
-    controller, rng = HybridController(), np.random.default_rng(5)
-    data = controller.engine.data
-    for tick in range(count):
-        pack(controller, *random_tick(rng, 2, tick=tick), last=rng.uniform(2.0, 20.0, 6), window=window)
-        exact = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
-        assert exact is not None
-        yield controller, exact
-
-
-@pytest.mark.parametrize("solver", installed_solvers())
-def test_any_back_end_of_qpsolvers_finds_the_same_solution_offline(solver: str) -> None:
-    for controller, exact in random_programs(10, (8.0, 13.0)):
-        options = {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 100_000} if solver == "osqp" else {}
-        found = solve_offline(controller.problem, controller.engine.data, solver, **options)
-        assert found is not None
-        np.testing.assert_allclose(found[0][:6], exact[0][:6], atol=1e-2)
-        assert found[1].shape == exact[1].shape
-
-
-def test_an_unknown_back_end_is_refused_by_name() -> None:
-    controller = HybridController()
-    with pytest.raises(IbvsQpError, match=r"'gurobbi' is not installed; there are .*osqp"):
-        solve_offline(controller.problem, controller.engine.data, "gurobbi")
 
 
 # --------------------------------------------------------------------------------------------- what may not matter
