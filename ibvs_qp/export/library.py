@@ -9,8 +9,7 @@ from pathlib import Path
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import qp_problem
-from ibvs_qp.export.layout import write_layout
-from ibvs_qp.export.tables import write_tables
+from ibvs_qp.export.tables import write_layout, write_tables
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.qp.program_code import write_program
 

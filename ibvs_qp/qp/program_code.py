@@ -141,53 +141,49 @@ def instance_workspace(text: str) -> tuple[str, str]:
         else:
             value = reference.sub(r"w->\1", initial)
             fills.append(f"  w->{name} = ({kind}){{{value}}};")
-    header = "\n".join(
-        [
-            "/* Workspace of OSQP, one per instance; generated. */",
-            "#ifndef IBVS_SOLVER_WORKSPACE_H",
-            "#define IBVS_SOLVER_WORKSPACE_H",
-            "",
-            '#include "osqp.h"',
-            '#include "types.h"',
-            '#include "algebra_impl.h"',
-            '#include "qdldl_interface.h"',
-            "",
-            "typedef struct {",
-            *members,
-            "} ibvs_solver_workspace;",
-            "",
-            "#endif",
-            "",
-        ]
-    )
-    code = "\n".join(
-        [
-            "/* Workspace of OSQP as after its set-up; generated. */",
-            "#include <string.h>",
-            "",
-            '#include "ibvs_program.h"',
-            "",
-            "/* OSQP leaves out entries at the end that are zero. */",
-            '#pragma GCC diagnostic ignored "-Wmissing-field-initializers"',
-            "",
-            *tables,
-            "",
-            "OSQPSolver *ibvs_solver_start(ibvs_solver_workspace *w) {",
-            "  memset(w, 0, sizeof *w);",
-            *fills,
-            "  for (int i = 0; i < IBVS_VARIABLES; ++i) { /* the first update sets all data: unscaled until then */",
-            "    w->scaling_D_val[i] = w->scaling_Dinv_val[i] = 1;",
-            "  }",
-            "  for (int i = 0; i < IBVS_ROWS; ++i) {",
-            "    w->scaling_E_val[i] = w->scaling_Einv_val[i] = 1;",
-            "  }",
-            "  w->scaling.c = w->scaling.cinv = 1;",
-            "  return &w->solver;",
-            "}",
-            "",
-        ]
-    )
+    header = _WORKSPACE_HEADER.replace("MEMBERS", "\n".join(members))
+    code = _WORKSPACE_CODE.replace("TABLES", "\n".join(tables)).replace("FILLS", "\n".join(fills))
     return header, code
+
+
+_WORKSPACE_HEADER = """/* Workspace of OSQP, one per instance; generated. */
+#ifndef IBVS_SOLVER_WORKSPACE_H
+#define IBVS_SOLVER_WORKSPACE_H
+
+#include "osqp.h"
+#include "types.h"
+#include "algebra_impl.h"
+#include "qdldl_interface.h"
+
+typedef struct {
+MEMBERS
+} ibvs_solver_workspace;
+
+#endif
+"""
+_WORKSPACE_CODE = """/* Workspace of OSQP as after its set-up; generated. */
+#include <string.h>
+
+#include "ibvs_program.h"
+
+/* OSQP leaves out entries at the end that are zero. */
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
+TABLES
+
+OSQPSolver *ibvs_solver_start(ibvs_solver_workspace *w) {
+  memset(w, 0, sizeof *w);
+FILLS
+  for (int i = 0; i < IBVS_VARIABLES; ++i) { /* the first update sets all data: unscaled until then */
+    w->scaling_D_val[i] = w->scaling_Dinv_val[i] = 1;
+  }
+  for (int i = 0; i < IBVS_ROWS; ++i) {
+    w->scaling_E_val[i] = w->scaling_Einv_val[i] = 1;
+  }
+  w->scaling.c = w->scaling.cinv = 1;
+  return &w->solver;
+}
+"""
 
 
 def real(value: float, single: bool) -> str:
