@@ -83,7 +83,7 @@ class TickCode:
 
 
 def analytic_terms(model: Model) -> list[ca.SX]:
-    """Terms of `ibvs_qp.analytic`: rows of the lines in body axes, commanded image accelerations, secondary acceleration.
+    """Terms of `ibvs_qp.analytic`: rows of the lines, commanded image accelerations, secondary acceleration.
 
     Returns:
         Rows one after the other, (6 (slots + 1),): the row of every line, then the angle of the line nearest the image
