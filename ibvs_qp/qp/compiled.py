@@ -14,7 +14,7 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.problem import ProgramData, QpProblem
-from ibvs_qp.qp.program_code import FOR_PYTHON, SHELL, write_program
+from ibvs_qp.qp.program_code import write_program
 from ibvs_qp.qp.solver import AcceptedSolution, Tried
 from ibvs_qp.symbolic.machine_code import cache_folder, compiler, shared_library
 
@@ -93,5 +93,4 @@ def solver_library(problem: QpProblem, settings: SolverSettings, command: list[s
         folder = Path(scratch)
         write_program(folder, problem, settings)
         sources = {file.name: file.read_text() for file in sorted(folder.rglob("*.[ch]"))}
-    sources[FOR_PYTHON] = (SHELL / FOR_PYTHON).read_text()
     return shared_library("solver", sources, command, FLAGS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -197,21 +198,13 @@ class TickReplay:
         return tuple(ranges)
 
 
-@dataclass(frozen=True, kw_only=True)
-class BoundRange:
-    """Range of one bound over which the set of active limits stays the same; there the cost is a parabola of the bound.
+class BoundRange(NamedTuple):
+    """Changes of one bound over which the set of active limits stays the same; there the cost is a parabola of it."""
 
-    Attributes:
-        lower: Most negative change of the bound within it, in the row's unit; -inf where nothing ends it.
-        upper: Most positive change.
-        end: Row that ends it on the side to which the bound yields: it is released there, or becomes active.
-        fall: By how much the cost is lower at that end, without unit.
-    """
-
-    lower: float
+    lower: float  # most negative, in the row's unit; -inf where nothing ends it
     upper: float
-    end: int
-    fall: float
+    end: int  # row that is released, or becomes active, at the end on the side to which the bound yields
+    fall: float  # of the cost to that end
 
 
 def bound_ranges(

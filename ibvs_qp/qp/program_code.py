@@ -23,8 +23,6 @@ from ibvs_qp.qp.solvers.osqp import osqp_settings
 
 #: OSQP at every tick and its acceptance test, the same for every program.
 SHELL = Path(__file__).parent / "c"
-#: Its part that only Python needs.
-FOR_PYTHON = "python_solve.c"
 #: Changes of OSQP's active set at most.
 PASSES = 20
 #: A variable of OSQP's file: type, name, length of an array, initial value.
@@ -88,9 +86,7 @@ def write_program(folder: Path, problem: QpProblem, settings: SolverSettings, si
     ]
     (folder / "ibvs_program_tables.c").write_text("\n".join(tables))
     write_osqp(folder, problem, settings, single)
-    for source in sorted(SHELL.iterdir()):
-        if source.name != FOR_PYTHON:
-            shutil.copyfile(source, folder / source.name)
+    shutil.copytree(SHELL, folder, dirs_exist_ok=True)
 
 
 def write_osqp(folder: Path, patterns: ProgramPatterns, settings: SolverSettings, single: bool) -> None:
