@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +89,7 @@ def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
     (folder / "ibvs_layout.h").write_text("\n".join(lines))
 
 
-def _explained(metadata: dict) -> str:
+def _explained(metadata: Mapping[str, Any]) -> str:
     unit = f" [{metadata['unit']}]" if metadata.get("unit") else ""
     return f"{metadata['doc']}{unit}, {metadata['low']:g} to {metadata['high']:g}"
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.compiled import CompiledSolver, compiled_solver
+from ibvs_qp.qp.compiled import compiled_solver
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.problem import ProgramData, QpProblem
-from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, BOUND_SLIP, AcceptedSolution, Solution, Solver, Tried, make_solver
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, BOUND_SLIP, AcceptedSolution, Solution, Tried, make_solver
 
 
 class QpEngine:
@@ -30,7 +31,7 @@ class QpEngine:
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
         compiled = compiled_solver(problem, settings, data) if settings.backend == "compiled" else None
-        self.solver: Solver | CompiledSolver = compiled or make_solver(problem, settings)
+        self.solver: Any = compiled or make_solver(problem, settings)  # a Solver, or the one with the test inside
         self._try = compiled.solve if compiled else self._in_python
         self.exact = ExactSolver(problem)
         self._rotors = n = problem.model.rotors

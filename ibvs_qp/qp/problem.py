@@ -124,7 +124,7 @@ class QpProblem:
         free = _unlimited_thrusts(hessian, gradient)
         noise = _noise_beyond_limits(model, free)
         gradient -= hessian @ noise
-        slack_weights = [ca.SX(self.limit_rows[place].slack_weight) for place in soft]
+        slack_weights = [ca.SX(row.slack_weight) for row in self.limit_rows if row.slack_weight is not None]
         p = ca.triu(ca.diagcat(hessian, *slack_weights))
         q = ca.vertcat(gradient, ca.DM.zeros(m))
 

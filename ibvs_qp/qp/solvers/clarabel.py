@@ -3,6 +3,7 @@
 Source: Goulart and Chen, Clarabel: an interior-point solver for conic programs with quadratic objectives, 2024.
 """
 
+# pyright: reportAttributeAccessIssue=false
 from __future__ import annotations
 
 import clarabel  # pyright: ignore[reportMissingImports] -- from the extra "solvers"

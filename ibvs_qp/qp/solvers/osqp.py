@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from typing import Any
 
 import numpy as np
 import osqp
@@ -34,22 +35,23 @@ class OsqpSolver(Solver):
         super().__init__(patterns, settings)
         self._no_multipliers = np.zeros(self._lengths[-1])
 
-    def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    def _setup(self, values: ProgramValues) -> osqp.OSQP:
+        p, q, a, lower, upper = values
         p_matrix, a_matrix = self.patterns.p_pattern.copy(), self.patterns.a_pattern.copy()
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
         solver = osqp.OSQP()
         solver.setup(
             p_matrix, q.copy(), a_matrix, lower.copy(), upper.copy(), verbose=False, **osqp_settings(self.settings)
         )
-        self.workspace = solver
         # The wrapper copies twenty fields of information per solve: 30 % more time per step. The extension object is
         # private; where a release of OSQP has none, the public interface is used.
-        self._inner = getattr(solver, "_solver", None) if self.settings.direct else None
+        self._inner: Any = getattr(solver, "_solver", None) if self.settings.direct else None
+        return solver
 
     def _solve(self, values: ProgramValues, initial: np.ndarray | None) -> Solution | None:
         p, q, a, lower, upper = values
         if self.workspace is None:
-            self._setup(p, q, a, lower, upper)
+            self.workspace = self._setup(values)
         elif self._inner is not None:
             if self._inner.update_data_vec(q, lower, upper) or self._inner.update_data_mat(p, None, a, None):
                 return None
