@@ -107,6 +107,7 @@ def write_osqp(folder: Path, patterns: ProgramPatterns, settings: SolverSettings
         -np.ones(rows),
         np.ones(rows),
         verbose=False,
+        warm_starting=True,
         **osqp_settings(settings),
     )
     with tempfile.TemporaryDirectory() as scratch:

@@ -40,9 +40,8 @@ class OsqpSolver(Solver):
         p_matrix, a_matrix = self.patterns.p_pattern.copy(), self.patterns.a_pattern.copy()
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
         solver = osqp.OSQP()
-        solver.setup(
-            p_matrix, q.copy(), a_matrix, lower.copy(), upper.copy(), verbose=False, **osqp_settings(self.settings)
-        )
+        settings = {"verbose": False, "warm_starting": True} | osqp_settings(self.settings)
+        solver.setup(p_matrix, q.copy(), a_matrix, lower.copy(), upper.copy(), **settings)
         # The wrapper copies twenty fields of information per solve: 30 % more time per step. The extension object is
         # private; where a release of OSQP has none, the public interface is used.
         self._inner: Any = getattr(solver, "_solver", None) if self.settings.direct else None
@@ -92,7 +91,6 @@ def osqp_settings(settings: SolverSettings) -> dict[str, float]:
         "adaptive_rho_tolerance": settings.adaptive_rho_tolerance,
         "scaling": settings.scaling,
         "check_dualgap": False,  # costs of 1e5 make it a test of rounding; the residuals bound the thrust error
-        "warm_starting": True,
     }
 
 
