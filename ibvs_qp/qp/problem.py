@@ -118,9 +118,8 @@ class QpProblem:
         weights = ca.vertcat(*(row.weight for row in self.task_rows))
         targets = ca.vertcat(*(row.target for row in self.task_rows))
         achieved = AffineRows(model, ca.vertcat(*(row.expression for row in self.task_rows)))
-        # OSQP may take a program that is not convex for solved: the root of a negative weight is NaN, which no solver
-        # accepts, and `program_faults` names the row.
-        hessian, gradient = achieved.least_squares(ca.if_else(weights >= 0.0, weights, ca.sqrt(weights)), targets)
+        convex = ca.vertcat(*(_convex(row.weight) for row in self.task_rows))
+        hessian, gradient = achieved.least_squares(convex, targets)
         free = _unlimited_thrusts(hessian, gradient)
         noise = _noise_beyond_limits(model, free)
         gradient -= hessian @ noise
@@ -213,6 +212,18 @@ def _checked_limits(model: Model, limit: Limit) -> list[LimitRow]:
         dataclasses.replace(row, lower=ca.if_else(on, row.lower, -WIDE), upper=ca.if_else(on, row.upper, WIDE))
         for row in rows
     ]
+
+
+def _convex(weight: ca.SX) -> ca.SX:
+    """The weight, NaN if it is negative: no solver accepts that, and `program_faults` names the row.
+
+    OSQP may take a program that is not convex for solved. A setting alone is never negative.
+    """
+    weight = ca.SX(weight)
+    symbols = ca.symvar(weight)
+    if symbols and all(symbol.name().startswith("weights.") for symbol in symbols):
+        return weight
+    return ca.if_else(weight >= 0.0, weight, ca.sqrt(weight))
 
 
 def _is_own(rows: Task | Limit) -> bool:
