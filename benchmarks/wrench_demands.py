@@ -29,8 +29,7 @@ from ibvs_qp.limits import ThrustLimit
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import Parameter, TaskRow
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.evaluator import RecordedProgram
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import QpProblem, RecordedProgram
 from ibvs_qp.tasks import EffortTask, SmoothnessTask, Task
 
 #: Half widths of the uniform demands about hover: lateral, vertical, roll and pitch, yaw [N, N m].

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from allocation import allocate_least_squares, allocate_sequential
@@ -9,6 +11,7 @@ from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.inputs import equations
 from ibvs_qp.model.interaction_matrix import endpoint_line_row
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clip, clipped_command, reach_note
@@ -110,11 +113,16 @@ def allocate_in_box(setpoints: Setpoints, free: np.ndarray) -> np.ndarray:
 
 def analytic_setpoints(config: ControllerConfig) -> Setpoints:
     """Targets of the tasks without a program: the analytic law combines them itself."""
+    return Setpoints(_analytic_model(equations(config)).of(config))
+
+
+@functools.lru_cache(maxsize=8)
+def _analytic_model(config: ControllerConfig) -> Model:
     model = Model(config)
     lines = [LineTask(index) for index in range(config.line_slots)]
     for task in (*lines, PushTask(), StandoffTask(), LevelTask(), YawTask(), VelocityTask()):
         task.rows(model)
-    return Setpoints(model)
+    return model
 
 
 class PaperController(CheckedLaw):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,6 +99,19 @@ class CheckedLaw(ABC):
             return hover_command(self.setpoints, stamp_ns, self.gate.inertial, rejected)
         self.setpoints.update(measurement, reference, contact)
         return self._command(measurement, reference, rejected)
+
+    def adjust(self, values: Mapping[str, Any]) -> None:
+        """Change gains, weights and limits from the next step on; states and sparsity stay.
+
+        Args:
+            values: By the names of a preset, as in ``{"weights.push": 0.2, "limits.tilt_deg": 2.0}``. A weight of 0
+                switches rows off, ``"limits.yaw_barrier": False`` a limit. A `Parameter` of an own task has its name.
+
+        Raises:
+            ConfigError: Naming a name that cannot change, or a value out of range; nothing is changed then.
+        """
+        self.setpoints.adjust(values)
+        self.config = self.setpoints.config
 
     @abstractmethod
     def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:

@@ -7,8 +7,10 @@ solves the program with OSQP and reports what tasks and limits did. The equation
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar
+import copy
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,8 +18,10 @@ from ibvs_qp.analytic import allocate_in_box, analytic_thrusts
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.inputs import equations
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import (
     clipped_command,
@@ -27,11 +31,10 @@ from ibvs_qp.model.reporting import (
 )
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import active_limits, task_reports
 from ibvs_qp.qp.infeasible import program_faults
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.solution import AcceptedSolution
+from ibvs_qp.qp.problem import Program, ProgramData, QpProblem
+from ibvs_qp.qp.solver import AcceptedSolution
 from ibvs_qp.tasks import (
     EffortTask,
     HeightTask,
@@ -77,8 +80,20 @@ def qp_problem(
     limits: Sequence[Limit] = (),
     kind: type[QpProblem] = QpProblem,
 ) -> QpProblem:
-    """The program of a configuration: the shipped tasks and limits and further ones."""
-    return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    """The program of a configuration: the shipped tasks and limits and further ones.
+
+    Without further ones the equations are built once for all configurations that share them (`equations`).
+    """
+    if tasks or limits:
+        return kind(Model(config), [*default_tasks(config), *tasks], [*default_limits(config), *limits])
+    problem = copy.copy(_shipped_problem(kind, equations(config)))
+    problem.model = problem.model.of(config)
+    return problem
+
+
+@functools.lru_cache(maxsize=8)
+def _shipped_problem(kind: type[QpProblem], config: ControllerConfig) -> QpProblem:
+    return kind(Model(config), default_tasks(config), default_limits(config))
 
 
 class HybridController(CheckedLaw):
@@ -114,6 +129,37 @@ class HybridController(CheckedLaw):
         super().reset()
         self.engine.reset()
         self._recovery = 0
+
+    def program(self, measurement: Measurement | None = None, reference: Reference | None = None) -> Program:
+        """The program of the last step, or of the next one with other inputs; no state changes.
+
+        Args:
+            measurement: Of the next step; None for the program of the last one.
+            reference: Of the next step; None for `Reference()`.
+
+        Raises:
+            ConfigError: When the measurement is refused.
+        """
+        if measurement is None:
+            return self.engine.data.program()
+        gates = self.gate, self.references
+        self.gate, self.references = copy.deepcopy(gates)
+        try:
+            with self.setpoints.without_trace():
+                inputs = self.check(measurement, reference or Reference(), None)
+                if inputs.measurement is None:
+                    raise ConfigError(f"the measurement is refused: {'; '.join(inputs.rejected)}")
+                self.setpoints.update(inputs.measurement, inputs.reference)
+                return self.engine.data.program()
+        finally:
+            self.gate, self.references = gates
+
+    def adjust(self, values: Mapping[str, Any]) -> None:
+        """See `CheckedLaw.adjust`; a limit without rows in this program cannot be switched on."""
+        for name, value in values.items():
+            if value and str(name).endswith("_barrier") and name not in self.problem.switches:
+                raise ConfigError(f"{name} = {value!r} is refused: the program has no rows of this limit")
+        super().adjust(values)
 
     def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         solution = self.engine.solve()

@@ -166,6 +166,15 @@ def from_dict(kind: type[T], table: dict[str, Any], path: str = "") -> T:
         raise ConfigError(f"{path or 'table'}: {error}") from None
 
 
+def adjusted(config: Any, section: str, values: dict[str, Any]) -> Any:
+    """A section of a configuration with other values, checked as `from_dict` does."""
+    checked = from_dict(type(getattr(config, section)), values, section)
+    try:
+        return dataclasses.replace(getattr(config, section), **{name: getattr(checked, name) for name in values})
+    except ConfigError as error:
+        raise ConfigError(f"{section}.{error}") from None
+
+
 @functools.cache
 def _settable(kind: type) -> dict[str, Any]:
     """Types of the fields of a dataclass by name."""

@@ -18,9 +18,9 @@ from ibvs_qp.estimation.stiffness import stiffness
 from ibvs_qp.estimation.touch import TouchDetector, touch_threshold
 from ibvs_qp.estimation.touch_compliance import MeasuredDistance, touch_compliance
 from ibvs_qp.estimation.wall_distance import Plane, Tick, WallDistance
+from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
-from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Without a plane for this long [s], a push means that the tip touches, whatever the drifting distance says.
 BLIND_S = 0.3

@@ -9,9 +9,9 @@ import casadi as ca
 
 from ibvs_qp.config import EstimationConfig
 from ibvs_qp.estimation.push_disturbance import SLOW_CHANGE, filter_gain, gust_weight
+from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.logic import both, where
 from ibvs_qp.symbolic.signals import Signals
-from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Band of the accelerometer's broadband noise [rad/s]: above the gusts, below the lines of the rotors, which integrate
 #: to nothing.

@@ -9,8 +9,7 @@ from pathlib import Path
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import qp_problem
-from ibvs_qp.export.layout import write_layout
-from ibvs_qp.export.tables import write_tables
+from ibvs_qp.export.tables import write_layout, write_tables
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.qp.program_code import write_program
 
@@ -60,6 +59,8 @@ def _check(config: ControllerConfig, single: bool) -> None:
         raise ConfigError("vehicle.camera_turn_deg: the C library has no turned camera, so it must be (0, 0, 0) deg")
     if not config.thrust_rows:
         raise ConfigError("thrust_rows: the C library keeps the thrust limits in the program, so it must be true")
+    if config.solver.name != "osqp":
+        raise ConfigError(f"solver.name = {config.solver.name!r} is refused: the C library has osqp only")
     count = config.vehicle.geometry.count
     if single and count > WRENCH:
         raise ConfigError(

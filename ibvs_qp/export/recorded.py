@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.export.binding import Structures
-from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.symbolic.literals import real, reals
+from ibvs_qp.measurement import VERTICAL, Measurement, Reference
+from ibvs_qp.qp.program_code import real, reals
+from ibvs_qp.validation.fields import REFERENCE, measurement_table
+from ibvs_qp.validation.measurement import LINES_PER_SLOT
 
 #: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
 #: of a tick on to the next ones.
@@ -29,12 +31,11 @@ def write_recorded(
         ticks: Measurements and references from the start of a flight.
         single: Whether the library's numbers are floats.
     """
-    controller = HybridController(config)
-    types = Structures(config, len(controller.problem.row_names), single)
+    controller, slots = HybridController(config), config.line_slots
     thrusts = [controller.step(*tick).thrusts for tick in ticks]
     parts = {
-        "measurement ibvs_recorded_measurements": [literal(types.packed(tick[0]), single) for tick in ticks],
-        "reference ibvs_recorded_references": [literal(types.packed_reference(tick[1]), single) for tick in ticks],
+        "measurement ibvs_recorded_measurements": [_measurement(tick[0], slots, single) for tick in ticks],
+        "reference ibvs_recorded_references": [_reference(tick[1], slots, single) for tick in ticks],
         "real ibvs_recorded_thrusts": [f"{{{reals(row, single)}}}" for row in thrusts],
     }
     code = ["/* Inputs of a recorded flight, and the thrusts of the Python controller [N]; generated. */"]
@@ -47,26 +48,52 @@ def write_recorded(
     (folder / "ibvs_recorded_ticks.h").write_text(_HEADER.format(count=len(ticks), tolerance=tolerance))
 
 
-def literal(value: Any, single: bool) -> str:
-    """Initialiser of a structure, an array or a number; entries that are zero are left out of structures."""
-    if isinstance(value, ctypes.Structure):
-        members = ((name, getattr(value, name)) for name, *_ in value._fields_)
-        return "{" + ", ".join(f".{name} = {literal(entry, single)}" for name, entry in members if any_set(entry)) + "}"
-    if isinstance(value, ctypes.Array):
-        entries = list(value)
-        while len(entries) > 1 and not any_set(entries[-1]):
-            entries.pop()
-        return "{" + ", ".join(literal(entry, single) for entry in entries) + "}"
+def _measurement(measurement: Measurement, slots: int, single: bool) -> str:
+    rows = measurement_table(0).rows
+    members = {row.name: getattr(measurement, row.name) for row in rows} | {"plane": measurement.plane}
+    optional = {row.name for row in rows if row.optional} | {"plane"}
+    known = {f"has_{name}": True for name in optional if members[name] is not None}
+    stamps = {name: getattr(measurement, name) for name in ("stamp_ns", "wrench_stamp_ns", "plane_stamp_ns")}
+    if measurement.velocity_stamp_ns is not None:
+        stamps |= {"has_velocity_stamp": True, "velocity_stamp_ns": measurement.velocity_stamp_ns}
+    lines = [
+        _structure(
+            single,
+            rho=line.rho,
+            theta=line.theta,
+            weight=line.weight,
+            variance=line.covariance.item(0),
+            stamp_ns=line.stamp_ns,
+            role=line.role == VERTICAL,
+        )
+        for line in measurement.lines[: LINES_PER_SLOT * slots]
+    ]
+    return _structure(single, **stamps, **known, **members, line_count=len(lines), lines=lines)
+
+
+def _reference(reference: Reference, slots: int, single: bool) -> str:
+    members = {row.name: getattr(reference, row.name) for row in REFERENCE.rows}
+    lines = [
+        _structure(single, rho=line.rho, theta=line.theta, role=line.role == VERTICAL)
+        for line in reference.lines[:slots]
+    ]
+    return _structure(single, **members, contact=reference.contact, line_count=len(lines), lines=lines)
+
+
+def _structure(single: bool, **members: Any) -> str:
+    """Initialiser of a structure; members that are None or zero are left out."""
+    named = ((name, value) for name, value in members.items() if value is not None and np.size(value) and np.any(value))
+    return "{" + (", ".join(f".{name} = {_literal(value, single)}" for name, value in named) or "0") + "}"
+
+
+def _literal(value: Any, single: bool) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Iterable):
+        return "{" + ", ".join(_literal(entry, single) for entry in value) + "}"
     if isinstance(value, float):
         return real(value, single)
     return f"INT64_C({value})" if type(value) is int and abs(value) > 2**31 - 1 else str(int(value))
-
-
-def any_set(value: Any) -> bool:
-    """Whether anything in a value is not zero."""
-    if isinstance(value, ctypes.Structure):
-        return any(any_set(getattr(value, name)) for name, *_ in value._fields_)
-    return any(map(any_set, value)) if isinstance(value, ctypes.Array) else bool(value)
 
 
 _HEADER = """/* Recorded flight for self-test and benchmark; generated. */

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import casadi as ca
 
-from ibvs_qp.export.analytic_terms import analytic_terms
+from ibvs_qp.model.inputs import setting_values
+from ibvs_qp.model.model import Model
 from ibvs_qp.model.tick import tick_signals
 from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.symbolic.logic import both, where
 from ibvs_qp.symbolic.signals import Signals, stack
+from ibvs_qp.tasks.line import line_state
 
 NAME = "ibvs_tick"
 #: Outputs that the library reads, or reports.
@@ -52,7 +55,10 @@ class TickCode:
     """
 
     def __init__(self, problem: QpProblem) -> None:
-        self.signals, (_, *results) = tick_signals(problem.model, [*problem.values, *analytic_terms(problem.model)])
+        values = setting_values(problem.model.config).items()
+        constants = {name: value for name, value in values if not name.startswith("gains.")}
+        extra = [*problem.values, *analytic_terms(problem.model)]
+        self.signals, (_, *results) = tick_signals(problem.model, extra, constants)
         self.signals.outputs = {name: self.signals.outputs[name] for name in OUTPUTS}
         _drop_states(self.signals, [*self.signals.outputs.values(), *results])
         states = ca.densify(self.signals.next_states)
@@ -74,6 +80,35 @@ class TickCode:
         if single:
             body = _DOUBLE.sub(r"\1f", body)
         (folder / f"{NAME}.c").write_text(_HEAD + body)
+
+
+def analytic_terms(model: Model) -> list[ca.SX]:
+    """Terms of `ibvs_qp.analytic`: rows of the lines, commanded image accelerations, secondary acceleration.
+
+    Returns:
+        Rows one after the other, (6 (slots + 1),): the row of every line, then the angle of the line nearest the image
+        centre; rows of absent lines are zero. Commands, (slots + 1,). Acceleration for their null space, (6,).
+    """
+    twist = model.camera_twist
+    rows, commands = [], []
+    level_row, level_command, nearest = ca.SX.zeros(1, 6), ca.SX(0.0), ca.SX(ca.inf)
+    for line in model.lines:
+        state = line_state(model, line.index)
+        rows.append(where(line.present, state.analytic_row, ca.SX.zeros(1, 6)))
+        commands.append(where(line.present, state.analytic_command, 0.0))
+        if not model.config.analytic_angle_row:
+            continue
+        nearer = both(line.present, ca.fabs(line.rho) < nearest)
+        nearest = where(nearer, ca.fabs(line.rho), nearest)
+        level_row = where(nearer, state.row_theta @ twist, level_row)
+        level_command = where(nearer, state.angle_command, level_command)
+    rows, commands = [*rows, level_row], [*commands, level_command]
+    out, wall = model.signals.outputs, model.wall
+    standoff = (1.0 - model.contact_weight) * out["standoff_command"] / model.config.vehicle.mass_kg
+    right, down = ca.vertsplit(out["velocity_command"])
+    linear = wall.normal * standoff + wall.right * right + wall.down * down
+    secondary = ca.vertcat(linear, out["level_command"], out["yaw_command"])
+    return [ca.vec(ca.vertcat(*rows).T), ca.vertcat(*commands), secondary]
 
 
 def _drop_states(signals: Signals, results: list[ca.SX]) -> None:

@@ -23,7 +23,7 @@ class ApproachLimit(Limit):
 
     def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in m/s^2; wide in contact, while the wall is unknown, and after a rotor is lost or stuck."""
-        settings, contact, motion = model.config.limits, model.contact, approach(model)
+        settings, contact, motion = model.limits, model.contact, approach(model)
         barrier = settings.approach_rate_1_s * (settings.approach_speed_ratio * motion.allowed + contact.rate)
         bound = barrier + motion.search / model.config.vehicle.mass_kg
         free = ca.logic_and(contact.known, ca.logic_not(contact.touching))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
@@ -10,6 +11,8 @@ import casadi as ca
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 
+#: One degree [rad].
+RADIAN = math.radians(1.0)
 #: Bound of an inactive row: finite, so that the row never changes its type in OSQP.
 WIDE = 1e4
 
@@ -35,7 +38,7 @@ class Limit(ABC):
         """Rows of the limit, affine in ``model.thrust`` and ``model.acceleration``."""
 
     @staticmethod
-    def slack_weight(model: Model, weight: float) -> float | None:
+    def slack_weight(model: Model, weight: ca.SX) -> ca.SX | None:
         """Weight of the slack; None with `limits.hard_barriers`."""
         return None if model.config.limits.hard_barriers else weight
 

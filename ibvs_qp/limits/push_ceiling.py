@@ -28,7 +28,7 @@ class PushCeiling(Limit):
 
     def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in newtons; wide before touch."""
-        settings, contact, mass = model.config.limits, model.contact, model.config.vehicle.mass_kg
+        settings, contact, mass = model.limits, model.contact, model.config.vehicle.mass_kg
         quiet = ca.fmax(settings.push_quiet_m_s, QUIET_SIGMAS * contact.rate_noise)
         closing = ca.fmin(contact.rate + quiet, 0.0)
         ceiling = settings.push_ceiling_ratio * model.push_reference

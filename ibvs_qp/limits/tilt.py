@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from ibvs_qp.limits.limit import Limit, barrier_bounds
+from ibvs_qp.limits.limit import RADIAN, Limit, barrier_bounds
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 
@@ -23,9 +23,9 @@ class TiltLimit(Limit):
 
     def rows(self, model: Model) -> list[LimitRow]:
         """Two soft rows in rad/s^2."""
-        settings, attitude, rows = model.config.limits, model.attitude, []
+        settings, attitude, rows = model.limits, model.attitude, []
         follows = ca.fmax(attitude.tilted, attitude.trimmed)
-        bound = ca.if_else(follows, FOLLOWING, math.radians(settings.tilt_deg))
+        bound = ca.if_else(follows, FOLLOWING, settings.tilt_deg * RADIAN)
         for axis, name in enumerate(("roll", "pitch")):
             angle, rate = attitude.tilt_error[axis], attitude.tilt_rate[axis]
             lower, upper = barrier_bounds(angle, rate, bound, settings.tilt_rate_1_s)

@@ -33,7 +33,7 @@ class ViewLimit(Limit):
 
     def rows(self, model: Model) -> list[LimitRow]:
         """Two soft rows in 1/s^2."""
-        settings, rows = model.config.limits, []
+        settings, rows = model.limits, []
         for role, least, largest in (
             (HORIZONTAL, settings.view_up, settings.view_down),
             (VERTICAL, settings.view_left, settings.view_right),

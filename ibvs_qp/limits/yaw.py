@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from ibvs_qp.limits.limit import Limit, barrier_bounds
+from ibvs_qp.limits.limit import RADIAN, Limit, barrier_bounds
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
 
@@ -18,9 +16,9 @@ class YawLimit(Limit):
 
     def rows(self, model: Model) -> list[LimitRow]:
         """One soft row in rad/s^2; inactive for a vehicle that lost a rotor and cannot hold yaw."""
-        settings, level = model.config.limits, 1.0 - model.attitude.tilted
+        settings, level = model.limits, 1.0 - model.attitude.tilted
         angle, rate = model.attitude.yaw * level, model.body.rate[2] * level
-        lower, upper = barrier_bounds(angle, rate, math.radians(settings.yaw_deg), settings.yaw_rate_1_s)
+        lower, upper = barrier_bounds(angle, rate, settings.yaw_deg * RADIAN, settings.yaw_rate_1_s)
         return [
             LimitRow(
                 name="yaw",

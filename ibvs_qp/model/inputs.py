@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
 
-from ibvs_qp.config import Gains
+from ibvs_qp.config import ControllerConfig, Gains, LimitSettings, SolverSettings, Weights
 from ibvs_qp.symbolic.signals import Signals
 
 #: Gain of an integral in the division that bounds it: one of zero has a bound as well.
@@ -182,15 +182,38 @@ LINE_OUTPUTS = (
 )
 
 
+#: Settings that decide which equations there are: constants of the program.
+STRUCTURAL = ("trim_deg", "view_rotation", "hard_barriers")
+#: Settings that are inputs of the tick: gains, weights, and bounds, slack weights and switches of the limits.
+RUN_TIME = {
+    "gains": _names(Gains),
+    "weights": _names(Weights),
+    "limits": tuple(name for name in _names(LimitSettings) if name not in STRUCTURAL),
+}
+
+
 def gravity_direction(attitude: ca.SX) -> ca.SX:
     """Unit gravity in B, (3,), by a quaternion; see `ibvs_qp.frames.down_in_body`."""
     w, x, y, z = ca.vertsplit(attitude)
     return ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
 
 
-def gain_inputs(signals: Signals) -> Any:
-    """Symbols of the gains under the names of `Gains`: they may change at run time."""
-    return SimpleNamespace(**{field.name: signals.input(f"gains.{field.name}") for field in fields(Gains)})
+def equations(config: ControllerConfig) -> ControllerConfig:
+    """What determines the equations: a configuration with the defaults of all that are inputs of the tick."""
+    switches = [name for name in RUN_TIME["limits"] if name.endswith("_barrier")]
+    limits = LimitSettings(**{name: getattr(config.limits, name) for name in (*STRUCTURAL, *switches)})
+    return replace(config, gains=Gains(), weights=Weights(), limits=limits, solver=SolverSettings())
+
+
+def setting_inputs(signals: Signals, section: str) -> Any:
+    """Symbols of a section of the settings under the names of its fields: they may change at run time."""
+    return SimpleNamespace(**{name: signals.input(f"{section}.{name}") for name in RUN_TIME[section]})
+
+
+def setting_values(config: ControllerConfig) -> dict[str, float]:
+    """Values of all settings that may change at run time, by the names of their inputs."""
+    sections = ((section, getattr(config, section), names) for section, names in RUN_TIME.items())
+    return {f"{section}.{name}": getattr(values, name) for section, values, names in sections for name in names}
 
 
 def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:

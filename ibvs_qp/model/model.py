@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -22,7 +23,7 @@ from ibvs_qp.model.camera_view import camera_view
 from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
 from ibvs_qp.model.friction import cautious_friction, estimated_friction
-from ibvs_qp.model.inputs import Body, Contact, Line, Target, gain_inputs
+from ibvs_qp.model.inputs import RUN_TIME, Body, Contact, Line, Target, setting_inputs
 from ibvs_qp.model.motor_thrust import motor_thrust
 from ibvs_qp.model.reach import STANDING_SPEED, push_planes, push_reach, push_reference
 from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
@@ -46,10 +47,10 @@ class Model:
     feed-forward. Rows are written in `thrust` and `acceleration`; `ibvs_qp.qp.problem` eliminates the acceleration.
 
     Args:
-        config: Everything it needs; its gains are inputs ``gains.line_kp`` and so on.
+        config: Everything it needs; its gains, weights and limits are inputs ``gains.line_kp`` and so on.
 
     Attributes:
-        gains: The feedback gains, symbols under the names of `ibvs_qp.config.Gains`.
+        gains, weights, limits: Symbols under the names of the settings (`ibvs_qp.model.inputs.RUN_TIME`).
         thrust: u [N], (n,).
         acceleration: nu_dot in B [m/s^2, rad/s^2], (6,).
         acceleration_now: nu_dot of the lagged thrusts; acceleration_commanded: of the last command, (6,).
@@ -66,18 +67,19 @@ class Model:
         bias_wrench: h [N, N m], (6,).
         reach: Largest push that the thrust limits allow [N].
         push_reference: Push reference within reach [N].
+        code: Functions of the equations, common to all copies.
         integrate: 1 while no limit takes wrench away: anti-windup of all integrals.
         integrate_in_plane: The same for integrals in the wall plane, which also stop while the tip is stuck.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
         self.config, self.signals, self.parameters = config, Signals(), list[Parameter]()
-        self._cache: dict[tuple[object, ...], object] = {}
+        self._cache, self.code = dict[tuple[object, ...], object](), dict[tuple[object, ...], Any]()
         vehicle, signals = config.vehicle, self.signals
         body, self.contact, self.target = Body.of(signals), Contact.of(signals), Target.of(signals)
         self.lines = [Line.of(signals, index) for index in range(config.line_slots)]
         self.contact_weight = signals.input("contact_weight")
-        self.gains = gain_inputs(signals)
+        self.gains, self.weights, self.limits = (setting_inputs(signals, section) for section in RUN_TIME)
 
         self.rotors = vehicle.geometry.count
         self.effectiveness = control_effectiveness(vehicle.geometry)
@@ -116,6 +118,19 @@ class Model:
         trim.update(planes, self.body, self.contact, target)
         self.push_reference = push_reference(signals, config, self.body, self.contact, target, self.reach)
         self._name_outputs()
+
+    def of(self, config: ControllerConfig) -> Model:
+        """A copy for a configuration with the same equations; what is declared in the copy stays in it."""
+        other = copy.copy(self)
+        other.config, other.signals, other.parameters = config, self.signals.copy(), list(self.parameters)
+        other._cache = dict(self._cache)
+        return other
+
+    def built(self, key: tuple[object, ...], build: Callable[[], T]) -> T:
+        """Function of the complete equations, built once for all copies (`of`)."""
+        if key not in self.code:
+            self.code[key] = build()
+        return self.code[key]
 
     def _stuck(self) -> ca.SX:
         # The body's velocity, not the tip's: a tip creeping at high friction must not stop the integral that frees it.

@@ -45,7 +45,7 @@ class LimitRow:
     expression: ca.SX
     lower: ca.SX
     upper: ca.SX
-    slack_weight: float | None = None
+    slack_weight: ca.SX | float | None = None
 
 
 class Parameter:

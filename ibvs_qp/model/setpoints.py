@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
+import dataclasses
+import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from allocation import WrenchFacets
 from allocation.reach import ray_reach
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.errors import ConfigError, shown
+from ibvs_qp.config.settings import adjusted
 from ibvs_qp.estimation.contact import no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.model.inputs import LINE_OUTPUTS
+from ibvs_qp.model.inputs import LINE_OUTPUTS, RUN_TIME, setting_values
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.packing import StepInputs
+from ibvs_qp.model.packing import KEPT, StepInputs
 from ibvs_qp.model.reach import UNBOUNDED
 from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.model.tick import TickFunction
@@ -91,10 +99,50 @@ class Setpoints:
         self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
         self.floor, self.ceiling = sensed["thrust_floor"], sensed["thrust_ceiling"]
         self.floor[:], self.ceiling[:] = vehicle.thrust_min, vehicle.thrust_max
-        for name, gain in vars(config.gains).items():
-            sensed[f"gains.{name}"][:] = gain
+        self.write_settings(config)
         self._rate_step = vehicle.thrust_rate_n_s * config.tick_s
         self.reset()
+
+    def write_settings(self, config: ControllerConfig) -> None:
+        """Take over gains, weights and limits of a configuration that has the same equations."""
+        self.config = config
+        for name, value in setting_values(config).items():
+            self._sensed[name][:] = value
+
+    def adjust(self, values: Mapping[str, Any]) -> None:
+        """Change gains, weights, limits and parameters of further tasks from the next step on; see `CheckedLaw`."""
+        changes: dict[str, dict[str, Any]] = {}
+        parameters = {parameter.name: parameter for _, parameter in self._parameters}
+        for name, value in values.items():
+            section, _, field = name.partition(".")
+            if name not in parameters and field not in RUN_TIME.get(section, ()):
+                known = [*parameters, *setting_values(self.config)]
+                near = difflib.get_close_matches(name, known, n=1)
+                hint = f"did you mean {near[0]!r}?" if near else f"these can: {', '.join(known)}"
+                raise ConfigError(f"{name} = {shown(value)} is refused: it cannot change between steps; {hint}")
+            if name not in parameters:
+                changes.setdefault(section, {})[field] = value
+            elif not np.isfinite(value).all() or np.size(value) not in (1, parameters[name].value.size):
+                allowed = f"{parameters[name].value.size} finite numbers are needed"
+                raise ConfigError(f"{name} = {shown(value)} is refused: {allowed}")
+        sections: dict[str, Any] = {name: adjusted(self.config, name, fields) for name, fields in changes.items()}
+        config = dataclasses.replace(self.config, **sections)
+        for name in parameters.keys() & values.keys():
+            parameters[name].value[:] = values[name]
+        self.write_settings(config)
+
+    @contextlib.contextmanager
+    def without_trace(self) -> Iterator[None]:
+        """What is evaluated inside leaves no trace: states, outputs, pairs of lines and time are as before."""
+        memory, own = self.step.memory.copy(), vars(self._inputs)
+        inputs, others = {name: own[name] for name in KEPT}, (self._stamp, self._contact)
+        own.update(copy.deepcopy(inputs))
+        try:
+            yield
+        finally:
+            self.step.memory[:] = memory
+            own.update(inputs)
+            self._stamp, self._contact = others
 
     def reset(self) -> None:
         """As before the first measurement."""

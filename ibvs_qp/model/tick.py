@@ -9,7 +9,8 @@ are one CasADi function, for Python and for the generated C code.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import casadi as ca
 
@@ -21,9 +22,10 @@ from ibvs_qp.estimation.stamps import FIRST_INTERVAL, LONGEST_INTERVAL
 from ibvs_qp.estimation.wall_distance import NEVER_S, Plane, Tick
 from ibvs_qp.model.inputs import CONTACT, TARGET, gravity_direction
 from ibvs_qp.model.model import Model
+from ibvs_qp.symbolic.function import StepFunction, step_function
 from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.machine_code import cache_folder, compiler, machine_code
 from ibvs_qp.symbolic.signals import GatedSignals, Signals, places, stack
-from ibvs_qp.symbolic.step_function import StepFunction
 
 #: Sensors that are arrays, and their sizes, in the order of packing (`ibvs_qp.model.packing`).
 ARRAYS = {
@@ -86,16 +88,42 @@ class TickFunction(StepFunction):
     """
 
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
-        signals, results = tick_signals(model, extra)
-        super().__init__(signals, results, model.config.compiled)
+        signals, function = model.built(("tick", *map(id, extra)), lambda: _tick(model, extra))[:2]
+        if model.config.compiled:
+            function = _translated(model, function)
+        super().__init__(signals, function=function)
         self.sensed, (self.point, *self.extra) = self.inputs, self.extra
         self.inputs = {name: self.point[place] for name, place in places(model.signals.inputs).items()}
 
 
-def tick_signals(model: Model, extra: Sequence[ca.SX] = ()) -> tuple[Signals, list[ca.SX]]:
-    """The tick's signals, and its further results: the point of the law, then ``extra``."""
+def _tick(model: Model, extra: Sequence[ca.SX]) -> tuple[Signals, ca.Function, Sequence[ca.SX]]:
+    signals, results = tick_signals(model, extra)
+    return signals, step_function(signals, results), extra  # the identities in the key stay those of living objects
+
+
+def _translated(model: Model, function: ca.Function) -> ca.Function:
+    """The function as machine code, in a process once per compiler and cache folder."""
+    key = ("machine code", function.__hash__(), *(compiler() or ()), str(cache_folder()))
+    if key in model.code:
+        return model.code[key]
+    found = machine_code(function)
+    if found is not function:
+        model.code[key] = found
+    return found
+
+
+def tick_signals(
+    model: Model, extra: Sequence[ca.SX] = (), constants: Mapping[str, float] = MappingProxyType({})
+) -> tuple[Signals, list[ca.SX]]:
+    """The tick's signals, and its further results: the point of the law, then ``extra``.
+
+    Args:
+        model: The law.
+        extra: Further results.
+        constants: Inputs of the law that are numbers of the equations instead, by name.
+    """
     law, signals = model.signals, Signals()
-    at_present = _at_present(signals, model.config)
+    at_present = _at_present(signals, model.config) | {name: ca.SX(value) for name, value in constants.items()}
     inputs = [
         at_present[name] if name in at_present else signals.input(name, symbol.numel())
         for name, symbol in law.inputs.items()

@@ -1,43 +1,38 @@
-"""The solve of one tick: OSQP, acceptance test, DAQP where the test fails."""
+"""The solve of one tick: the chosen solver, acceptance test, DAQP where the test fails."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.compiled import CompiledSolver, compiled_solver
-from ibvs_qp.qp.evaluator import ProgramData
+from ibvs_qp.qp.compiled import compiled_solver
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
-from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, BOUND_SLIP, AcceptedSolution, Tried
-
-#: Outcome by OSQP's status; with any other status the iterate means nothing.
-OUTCOMES = {
-    SOLVED: Outcome.SOLVED,
-    SOLVED_INACCURATE: Outcome.INACCURATE_ACCEPTED,
-    MAX_ITERATIONS: Outcome.CAPPED_ACCEPTED,
-}
+from ibvs_qp.qp.problem import ProgramData, QpProblem
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, BOUND_SLIP, AcceptedSolution, Solution, Tried, make_solver
 
 
 class QpEngine:
-    """OSQP at every tick; DAQP in the same tick where OSQP's answer fails the acceptance test.
+    """The solver of the settings at every tick; DAQP in the same tick where its answer fails the acceptance test.
 
-    OSQP starts from the last solution, after a tick without an active limit from this tick's solution without rows.
+    The solver starts from the last solution, after a tick without an active limit from this tick's solution without
+    rows.
 
     Attributes:
         data: Values of the program.
+        solver: The solver that is tried first; the compiled one has the acceptance test inside.
         conflict: Names of a smallest set of hard rows that contradict each other, after a solve without a solution.
     """
 
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
         compiled = compiled_solver(problem, settings, data) if settings.backend == "compiled" else None
-        self.osqp: OsqpSolver | CompiledSolver = compiled or OsqpSolver(problem, settings)
+        self.solver: Any = compiled or make_solver(problem, settings)  # a Solver, or the one with the test inside
+        self._try = compiled.solve if compiled else self._in_python
         self.exact = ExactSolver(problem)
         self._rotors = n = problem.model.rotors
         self._program = data.p, data.q, data.a, data.lower, data.upper
@@ -47,46 +42,45 @@ class QpEngine:
 
     def reset(self) -> None:
         """As after construction."""
-        self.osqp.reset()
+        self.solver.reset()
         self._limited = False
 
     def solve(self) -> AcceptedSolution | None:
         """Solve the program of this tick; None if neither solver has a solution."""
         self.conflict = ()
-        if isinstance(self.osqp, CompiledSolver):
-            accepted, tried = self.osqp.solve()
-        else:
-            accepted, tried = self._interpreted(self.osqp)
+        accepted, tried = self._try()
         if accepted is not None or tried is None:
             return accepted
         exact = self.exact.solve(*self._program)
         if exact is not None:
-            self.osqp.warm_start(*exact)
-            return self._accepted(*exact, Outcome.EXACT_FALLBACK, tried)
+            self.solver.warm_start(exact.x, exact.y)
+            return self._accepted(exact, Outcome.EXACT_FALLBACK, tried)
         self.conflict = conflicting_rows(self.problem, self.data)
         self.reset()
         return None
 
-    def _interpreted(self, solver: OsqpSolver) -> tuple[AcceptedSolution | None, Tried | None]:
-        raw = solver.solve(*self._program, initial=None if self._limited else self.data.unlimited)
-        if raw is None:
+    def _in_python(self) -> tuple[AcceptedSolution | None, Tried | None]:
+        found = self.solver.solve(*self._program, initial=None if self._limited else self.data.unlimited)
+        if found is None:
             return None, None
-        tried, outcome = Tried(raw.iterations, raw.seconds), self.accepts(raw)
-        return None if outcome is None else self._accepted(raw.x, raw.y, outcome, tried), tried
+        tried, outcome = Tried(found.iterations, found.seconds), self.accepts(found)
+        return None if outcome is None else self._accepted(found, outcome, tried), tried
 
-    def accepts(self, raw: RawSolution) -> Outcome | None:
+    def accepts(self, found: Solution) -> Outcome | None:
         """Acceptance test: status, finiteness, bounds, residuals; None if the answer fails it.
 
-        The status comes first: the iterate of an infeasible program is 2143289344.0, a finite number.
+        The status comes first: the iterate of an infeasible program is 2143289344.0 in OSQP, a finite number. The dual
+        residual of a solved program is not computed again where the solver has tested it (`Solver.tests_residuals`).
         """
-        outcome = OUTCOMES.get(raw.status)
-        if outcome is None or not math.isfinite(raw.x.dot(raw.x) + raw.y.dot(raw.y)):
+        x, y, outcome = found.x, found.y, found.status
+        if outcome is None or not math.isfinite(x.dot(x) + y.dot(y)):
             return None
-        slip = self.primal_residual(raw.x)
-        if outcome is Outcome.SOLVED:
+        slip, largest = self.primal_residual(x), self.settings.accept_residual
+        tested = self.solver.tests_residuals
+        if outcome is Outcome.SOLVED and tested:
             return outcome if slip <= BOUND_SLIP else None
-        largest = self.settings.accept_residual
-        return outcome if slip <= largest and self.dual_residual(raw.x, raw.y) <= largest else None
+        complementary = tested or self.distance_of_active_rows(x, y) <= largest
+        return outcome if slip <= largest and self.dual_residual(x, y) <= largest and complementary else None
 
     def primal_residual(self, x: np.ndarray) -> float:
         """Largest violation of a hard row [N of thrust]."""
@@ -105,7 +99,14 @@ class QpEngine:
         data = self.data
         return float(np.abs(x + np.linalg.solve(data.hessian(), data.q + data.rows().T @ y)).max())
 
-    def _accepted(self, x: np.ndarray, y: np.ndarray, outcome: Outcome, tried: Tried) -> AcceptedSolution:
+    def distance_of_active_rows(self, x: np.ndarray, y: np.ndarray) -> float:
+        """Largest distance of a row from the bound that its multiplier states [N of thrust or unit of slack]."""
+        rows, data = self.data.rows(), self.data
+        away = np.where(y > 0.0, data.upper - rows @ x, rows @ x - data.lower) / np.linalg.norm(rows, axis=1)
+        return float(away[np.abs(y) > ACTIVE_MULTIPLIER].max(initial=0.0))
+
+    def _accepted(self, found: Solution, outcome: Outcome, tried: Tried) -> AcceptedSolution:
+        x, y = found.x, found.y
         thrusts = np.minimum(np.maximum(x[: self._rotors], self._lower), self._upper)
         self._limited = max(map(abs, y.tolist())) > ACTIVE_MULTIPLIER
         return AcceptedSolution(thrusts, x, y, outcome, *tried, self._limited)

@@ -13,12 +13,10 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.program_code import FOR_PYTHON, SHELL, write_program
-from ibvs_qp.qp.solution import AcceptedSolution, Tried
-from ibvs_qp.symbolic.compiler import compiler
-from ibvs_qp.symbolic.shared_library import shared_library
+from ibvs_qp.qp.problem import ProgramData, QpProblem
+from ibvs_qp.qp.program_code import write_program
+from ibvs_qp.qp.solver import AcceptedSolution, Tried
+from ibvs_qp.symbolic.machine_code import cache_folder, compiler, shared_library
 
 #: How the code is translated: no contraction of products and sums, so the same bits as OSQP's Python extension.
 FLAGS = ("-std=c11", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-w")
@@ -29,16 +27,16 @@ log = logging.getLogger(__name__)
 
 
 class CompiledSolver:
-    """OSQP with one workspace for all ticks; see `ibvs_qp.qp.osqp` and ``ibvs_qp/qp/c/solve.c``.
+    """OSQP with one workspace for all ticks; see `ibvs_qp.qp.solvers.osqp` and ``ibvs_qp/qp/c/solve.c``.
 
     Args:
-        library: The shared library of `solver_library`.
+        code: The shared library of `solver_library`.
         data: Values of the program, where the step function writes them.
         rotors: Thrusts among the variables.
     """
 
-    def __init__(self, library: Path, data: ProgramData, rotors: int) -> None:
-        self._code = ctypes.CDLL(str(library))
+    def __init__(self, code: ctypes.CDLL, data: ProgramData, rotors: int) -> None:
+        self._code = code
         self._code.ibvs_solve_values.restype = ctypes.c_bool
         values = data.p, data.q, data.a, data.lower, data.upper, data.unlimited
         variables, rows = len(data.q), len(data.lower)
@@ -81,7 +79,9 @@ def compiled_solver(problem: QpProblem, settings: SolverSettings, data: ProgramD
         log.info("no C compiler: OSQP runs in its Python extension")
         return None
     try:
-        return CompiledSolver(solver_library(problem, settings, command), data, problem.model.rotors)
+        key = ("solver", settings, *command, str(cache_folder()))
+        code = problem.model.built(key, lambda: ctypes.CDLL(str(solver_library(problem, settings, command))))
+        return CompiledSolver(code, data, problem.model.rotors)
     except (OSError, subprocess.SubprocessError) as error:
         log.warning("OSQP runs in its Python extension: %s", error)
         return None
@@ -93,5 +93,4 @@ def solver_library(problem: QpProblem, settings: SolverSettings, command: list[s
         folder = Path(scratch)
         write_program(folder, problem, settings)
         sources = {file.name: file.read_text() for file in sorted(folder.rglob("*.[ch]"))}
-    sources[FOR_PYTHON] = (SHELL / FOR_PYTHON).read_text()
     return shared_library("solver", sources, command, FLAGS)

@@ -1,20 +1,24 @@
-"""Explanation of a tick: reports of tasks and limits, and the exact solution of a recorded program."""
+"""Explanation of a tick: reports of tasks and limits, exact solution of a recorded program, ranges of bounds."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ibvs_qp.command import ActiveLimit, TaskReport, TaskReports
+from ibvs_qp.command import ActiveLimit, Outcome, TaskReport, TaskReports
+from ibvs_qp.config import SolverSettings
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.qp.bound_range import bound_ranges
-from ibvs_qp.qp.evaluator import ProgramData, RecordedProgram
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER
+from ibvs_qp.qp.problem import ProgramData, QpProblem, RecordedProgram
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, Solver, make_solver
+
+#: Iterations of a solver without a deadline.
+LONG = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,16 +106,18 @@ class TickReplay:
 
     Args:
         problem: The program.
-        solver: Back end of qpsolvers that solves it; None for the exact solver.
+        solver: Name of the solver (`solver.name`); None for the exact one.
 
     Attributes:
         conflict: Names of the rows that contradict each other, where the last tick explained has no solution.
     """
 
     def __init__(self, problem: QpProblem, solver: str | None = None) -> None:
-        self._problem, self._solver = problem, solver
-        self._data = RecordedProgram(problem)
+        self._problem, self._data = problem, RecordedProgram(problem)
         self._exact = ExactSolver(problem)
+        self._solver: Solver = self._exact
+        if solver is not None:
+            self._solver = make_solver(problem, SolverSettings(name=solver, max_iterations=LONG))
         self.conflict: tuple[str, ...] = ()
 
     def explain(self, point: np.ndarray) -> Explanation | None:
@@ -129,20 +135,21 @@ class TickReplay:
             raise ConfigError(f"a recorded tick of {len(point)} numbers is refused: {wanted}")
         data.point[:] = point
         data.evaluate()
-        solution, self.conflict = self._solve(), ()
-        if solution is None:
+        self._solver.reset()
+        solution, self.conflict = self._solver.solve(data.p, data.q, data.a, data.lower, data.upper), ()
+        if solution is None or solution.status is not Outcome.SOLVED:
             self.conflict = conflicting_rows(problem, data)
             return None
-        x, y = solution
+        x, y = solution.x, solution.y
         thrusts = x[: problem.model.rotors]
         tasks = tuple(task_reports(problem, data, thrusts))
         cost = np.array([0.5 * task.weight * task.residual**2 for task in tasks])
-        slack = x[len(thrusts) :]
-        slack_cost = 0.5 * float(slack @ (data.hessian().diagonal()[len(thrusts) :] * slack))
+        slack, slack_weights = x[len(thrusts) :], data.hessian().diagonal()[len(thrusts) :]
+        slack_cost = 0.5 * float(slack @ (slack_weights * slack))
         total = float(cost.sum()) + slack_cost or 1.0
         limits = sorted(active_limits(problem, x, y), key=lambda limit: -limit.price)
-        weights = {row.name: row.slack_weight or 0.0 for row in problem.limit_rows}
-        paid = (0.5 * weights[limit.name] * limit.slack**2 / total for limit in limits)
+        weights = dict(zip(problem.variable_names[len(thrusts) :], slack_weights, strict=True))
+        paid = (0.5 * weights.get(f"slack_{limit.name}", 0.0) * limit.slack**2 / total for limit in limits)
         effectiveness = problem.model.effectiveness
         return Explanation(
             thrusts=thrusts,
@@ -179,21 +186,77 @@ class TickReplay:
         data, every = self._data, self._problem.row_names
         exact = self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         assert exact is not None
-        found = bound_ranges(data.hessian(), data.rows(), data.lower, data.upper, *exact)
+        found = bound_ranges(data.hessian(), data.rows(), data.lower, data.upper, exact.x, exact.y)
         ranges = []
         for row in map(every.index, names):
             if (at := found.get(row)) is None:
                 ranges.append(LimitRange(change_low=0.0, change_high=0.0, cost_fall=0.0, until="unknown"))
                 continue
-            event = "active" if exact[1][at.end] == 0.0 else "released"
+            event = "active" if exact.y[at.end] == 0.0 else "released"
             until = event if at.end == row else f"{every[at.end]} {event}"
             ranges.append(LimitRange(change_low=at.lower, change_high=at.upper, cost_fall=at.fall, until=until))
         return tuple(ranges)
 
-    def _solve(self) -> tuple[np.ndarray, np.ndarray] | None:
-        data = self._data
-        if self._solver is None:
-            return self._exact.solve(data.p, data.q, data.a, data.lower, data.upper)
-        from ibvs_qp.qp.offline import solve_offline  # qpsolvers loads every installed back end
 
-        return solve_offline(self._problem, data, self._solver)
+class BoundRange(NamedTuple):
+    """Changes of one bound over which the set of active limits stays the same; there the cost is a parabola of it."""
+
+    lower: float  # most negative, in the row's unit; -inf where nothing ends it
+    upper: float
+    end: int  # row that is released, or becomes active, at the end on the side to which the bound yields
+    fall: float  # of the cost to that end
+
+
+def bound_ranges(
+    hessian: np.ndarray, rows: np.ndarray, lower: np.ndarray, upper: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> dict[int, BoundRange]:
+    r"""Ranges of the bounds of all active rows, by row.
+
+    With the active rows :math:`A_W x = b_W`, solution and multipliers are linear in the bounds,
+
+    .. math:: \begin{pmatrix} P & A_W^T \\ A_W & 0 \end{pmatrix} \begin{pmatrix} dx \\ dy_W \end{pmatrix} =
+        \begin{pmatrix} 0 \\ db_W \end{pmatrix},
+
+    until a multiplier is zero or another row meets its bound. The derivative of the cost by a bound is :math:`-y`.
+
+    Args:
+        hessian: P, positive definite, (variables, variables).
+        rows: A, (rows, variables).
+        lower: Bounds of A x, (rows,).
+        upper: The same.
+        x: Solution, (variables,).
+        y: Its multipliers, > 0 at an upper bound, exactly 0 of an inactive row, (rows,).
+
+    Returns:
+        One range per active row; none if the active rows depend on each other.
+
+    Source: Best, An algorithm for the solution of the parametric quadratic programming problem, 1996.
+    """
+    active, size = np.flatnonzero(y), len(x)
+    matrix = np.zeros((size + len(active), size + len(active)))
+    matrix[:size, :size], matrix[:size, size:], matrix[size:, :size] = hessian, rows[active].T, rows[active]
+    try:
+        moves = np.linalg.solve(matrix, np.eye(len(matrix))[:, size:])
+    except np.linalg.LinAlgError:
+        return {}
+    value, free, found = rows @ x, np.flatnonzero(y == 0.0), {}
+    for place, row in enumerate(active):
+        slopes = rows @ moves[:size, place]  # of all values per unit of this bound
+        changes = np.zeros(len(y))
+        changes[active] = moves[size:, place]  # of all multipliers
+        ends = {}
+        for way in (-1.0, 1.0):
+            room = np.full(len(y), math.inf)
+            falling = np.flatnonzero(way * changes * y < 0.0)
+            room[falling] = -y[falling] / (way * changes[falling])
+            rising, sinking = free[way * slopes[free] > 0.0], free[way * slopes[free] < 0.0]
+            room[rising] = (upper - value)[rising] / (way * slopes[rising])
+            room[sinking] = (lower - value)[sinking] / (way * slopes[sinking])
+            if way * y[row] < 0.0:  # it meets the row's other bound
+                room[row] = upper[row] - lower[row]
+            end = int(np.argmin(room))
+            ends[way] = max(float(room[end]), 0.0), end
+        length, end = ends[math.copysign(1.0, y[row])]
+        fall = (abs(y[row]) + 0.5 * changes[row] * length) * length  # the multiplier falls by `changes` on the way
+        found[int(row)] = BoundRange(lower=-ends[-1.0][0], upper=ends[1.0][0], end=end, fall=float(fall))
+    return found

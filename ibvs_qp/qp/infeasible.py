@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpProblem
+from ibvs_qp.qp.problem import ProgramData, QpProblem
 
 #: Residual of the certificate below which there is no solution; a residual r means a solution
 #: 1/r newtons away.

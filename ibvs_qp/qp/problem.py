@@ -1,38 +1,32 @@
-"""Assembly of tasks and limits to one program of fixed sparsity, condensed to thrusts and slacks."""
+"""Assembly of tasks and limits to one program of fixed sparsity, condensed to thrusts and slacks, and its values."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
-from ibvs_qp.limits.limit import Limit
-from ibvs_qp.model.inputs import clamp
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.limits.limit import WIDE, Limit
+from ibvs_qp.model.inputs import clamp, setting_values
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
-from ibvs_qp.qp.row_check import check_rows
-from ibvs_qp.symbolic.bound_function import ArrayFunction
+from ibvs_qp.qp.solver import DenseProgram
+from ibvs_qp.symbolic.function import ArrayFunction, StepFunction
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
-
-if TYPE_CHECKING:
-    from scipy import sparse
 
 #: More rotors than this have directions without a wrench.
 REDUNDANT_ABOVE = 6
 #: Excess over a limit that is no noise, over `limits.thrust_noise_n` [-]: far beyond its reach a push that is clipped
 #: tilts the vehicle.
 NO_NOISE = 5.0
-
-
-class ProgramPatterns(Protocol):
-    """Sparsity of a program: upper triangle of P, and A; enough for a solver."""
-
-    p_pattern: sparse.csc_matrix
-    a_pattern: sparse.csc_matrix
 
 
 class AffineRows:
@@ -104,6 +98,7 @@ class QpProblem:
             of the thrusts without limits; extra results of the step function.
         report: Function of point (inputs and states) and thrusts: achieved and target values of every task row, and
             weights, (rows,) each.
+        switches: Names of the settings that switch its limits.
         row_slack: Column of every row's slack in x, -1 where the row is hard, (rows,).
 
     Raises:
@@ -112,23 +107,24 @@ class QpProblem:
 
     def __init__(self, model: Model, tasks: Sequence[Task], limits: Sequence[Limit]) -> None:
         self.model = model
-        self.task_rows: list[TaskRow] = [row for task in tasks for row in task.rows(model)]
-        self.limit_rows: list[LimitRow] = [row for limit in limits for row in limit.rows(model)]
-        check_rows(model, self.task_rows, self.limit_rows)
+        self.task_rows: list[TaskRow] = [row for task in tasks for row in _checked_tasks(model, task)]
+        self.limit_rows: list[LimitRow] = [row for limit in limits for row in _checked_limits(model, limit)]
+        _refuse_duplicates("task", [row.name for row in self.task_rows])
+        _refuse_duplicates("limit", [row.name for row in self.limit_rows])
+        self.switches = frozenset(limit.switch_setting for limit in limits)
         soft = [place for place, row in enumerate(self.limit_rows) if row.slack_weight is not None]
         n, m, rows = model.rotors, len(soft), len(self.limit_rows)
 
         weights = ca.vertcat(*(row.weight for row in self.task_rows))
         targets = ca.vertcat(*(row.target for row in self.task_rows))
         achieved = AffineRows(model, ca.vertcat(*(row.expression for row in self.task_rows)))
-        # OSQP may take a program that is not convex for solved: the root of a negative weight is NaN, which no solver
-        # accepts, and `program_faults` names the row.
-        hessian, gradient = achieved.least_squares(ca.if_else(weights >= 0.0, weights, ca.sqrt(weights)), targets)
+        convex = ca.vertcat(*(_convex(row.weight) for row in self.task_rows))
+        hessian, gradient = achieved.least_squares(convex, targets)
         free = _unlimited_thrusts(hessian, gradient)
         noise = _noise_beyond_limits(model, free)
         gradient -= hessian @ noise
-        slack_weights = [float(self.limit_rows[place].slack_weight or 0.0) for place in soft]
-        p = ca.triu(ca.diagcat(hessian, ca.SX(ca.diag(ca.DM(slack_weights)))) if m else hessian)
+        slack_weights = [ca.SX(row.slack_weight) for row in self.limit_rows if row.slack_weight is not None]
+        p = ca.triu(ca.diagcat(hessian, *slack_weights))
         q = ca.vertcat(gradient, ca.DM.zeros(m))
 
         bounds = AffineRows(model, ca.vertcat(*(row.expression for row in self.limit_rows)))
@@ -175,8 +171,8 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
     None for a rotor whose limit is reported (a weak one, say), where an error would last, and none with redundant
     rotors, which give noise up at no cost of the wrench.
     """
-    most = model.config.limits.thrust_noise_n
-    if not model.config.thrust_rows or most == 0.0 or model.rotors > REDUNDANT_ABOVE:
+    most = model.limits.thrust_noise_n
+    if not model.config.thrust_rows or model.rotors > REDUNDANT_ABOVE:
         return ca.SX(model.rotors, 1)
     (low, high), (floor, ceiling) = model.thrust_limits, model.thrust_box
     own = ca.logic_and(low <= floor, high >= ceiling)
@@ -186,8 +182,151 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
-    from scipy import sparse  # slow to import, and no program is made before a controller
-
     column, row = sparsity.get_ccs()
     data = np.ones(sparsity.nnz())
     return sparse.csc_matrix((data, row, column), shape=sparsity.shape)
+
+
+def _checked_tasks(model: Model, task: Task) -> list[TaskRow]:
+    """Rows of a task; of a user's own task, refused where the program cannot contain them."""
+    rows = task.rows(model)
+    for row in rows if _is_own(task) else ():
+        _refuse_curved(model, f"task {row.name}", row.expression, target=row.target, weight=row.weight)
+    return rows
+
+
+def _checked_limits(model: Model, limit: Limit) -> list[LimitRow]:
+    """Rows of a limit, far away while its switch is off; of a user's own limit, refused likewise."""
+    rows = limit.rows(model)
+    for row in rows if _is_own(limit) else ():
+        _refuse_curved(model, f"limit {row.name}", row.expression, lower=row.lower, upper=row.upper)
+        weight = row.slack_weight
+        if weight is not None and not 0.0 < weight < math.inf:
+            allowed = "greater than 0 and finite, None if it is hard"
+            raise ConfigError(f"limit {row.name}: slack_weight = {weight!r} is refused: {allowed}")
+    section, _, switch = (limit.switch_setting or "").partition(".")
+    if section != "limits":
+        return rows
+    on = getattr(model.limits, switch)
+    return [
+        dataclasses.replace(row, lower=ca.if_else(on, row.lower, -WIDE), upper=ca.if_else(on, row.upper, WIDE))
+        for row in rows
+    ]
+
+
+def _convex(weight: ca.SX) -> ca.SX:
+    """The weight, NaN if it is negative: no solver accepts that, and `program_faults` names the row.
+
+    OSQP may take a program that is not convex for solved. A setting alone is never negative.
+    """
+    weight = ca.SX(weight)
+    symbols = ca.symvar(weight)
+    if symbols and all(symbol.name().startswith("weights.") for symbol in symbols):
+        return weight
+    return ca.if_else(weight >= 0.0, weight, ca.sqrt(weight))
+
+
+def _is_own(rows: Task | Limit) -> bool:
+    """Whether a task or limit is not one of the package, whose rows the tests check."""
+    return not type(rows).__module__.startswith("ibvs_qp.")
+
+
+def _refuse_duplicates(kind: str, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{kind} rows need unique names: {name!r} appears {names.count(name)} times")
+
+
+def _refuse_curved(model: Model, row: str, expression: ca.SX, **others: ca.SX) -> None:
+    unknown = ca.veccat(model.thrust, model.acceleration)
+    if ca.depends_on(ca.jacobian(expression, unknown), unknown):
+        raise ConfigError(f"{row}: its expression must be affine in the thrusts")
+    for what, symbol in others.items():
+        if ca.depends_on(ca.SX(symbol), unknown):
+            raise ConfigError(f"{row}: its {what} must not depend on the thrusts")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program:
+    r"""The program of one tick, :math:`\min \tfrac12 x^T P x + q^T x,\; l \le A x \le u` with x = (thrusts, slacks).
+
+    Attributes:
+        P, q, A, lower, upper: Its matrices in full.
+        variables: Names of the entries of x: thrusts, then slacks of the soft limits.
+        limits: Names of the rows of A.
+        tasks: Names of the least-squares rows that add up to P and q.
+        weights: Weights of the task rows at this tick, (tasks,).
+    """
+
+    P: np.ndarray
+    q: np.ndarray
+    A: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    variables: tuple[str, ...]
+    limits: tuple[str, ...]
+    tasks: tuple[str, ...]
+    weights: np.ndarray
+
+
+class ProgramData:
+    """Values of one step's program, where the step function writes them.
+
+    Attributes:
+        p: Non-zeros of the upper triangle of P. Likewise q, a, lower, upper.
+        unlimited: Solution of the same program without any row of A, (variables,).
+        free: Thrusts without limits [N], (n,): `unlimited` before noise at the limits is clipped.
+        further: Further values of the problem, in their order.
+        point: Inputs and states of the step; `inputs` are views of it by name.
+    """
+
+    def __init__(self, problem: QpProblem, step: StepFunction) -> None:
+        self.p, self.q, self.a, self.lower, self.upper, self.unlimited, self.free, *self.further = step.extra
+        self._step = step  # owns the memory that the compiled function writes
+        self.point, self.inputs = step.point, step.inputs
+        self._problem, self._dense = problem, DenseProgram(problem)
+
+    @property
+    def beyond_limits(self) -> bool:
+        """Whether the thrusts without limits pass a thrust limit, by noise or by more."""
+        n = len(self.free)
+        return bool((self.free < self.lower[:n]).any() or (self.free > self.upper[:n]).any())
+
+    def hessian(self) -> np.ndarray:
+        """P in full, (variables, variables)."""
+        return self._dense.hessian(self.p)
+
+    def rows(self) -> np.ndarray:
+        """A in full, (rows, variables)."""
+        return self._dense.rows(self.a)
+
+    def program(self) -> Program:
+        """A copy of the program with its names."""
+        problem = self._problem
+        return Program(
+            P=self.hessian(),
+            q=self.q.copy(),
+            A=self.rows(),
+            lower=self.lower.copy(),
+            upper=self.upper.copy(),
+            variables=problem.variable_names,
+            limits=problem.row_names,
+            tasks=tuple(name for name, _ in problem.task_names),
+            weights=problem.report(self.point, self.free)[2],
+        )
+
+    def limit_values(self, thrusts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Value, lower and upper bound of every limit row at given thrusts, in the row's own unit."""
+        value, lower, upper = self._problem.limit_values(self.point, thrusts)
+        return value, lower, upper
+
+
+class RecordedProgram(ProgramData):
+    """The program of recorded steps: set `point`, evaluate, read the values."""
+
+    def __init__(self, problem: QpProblem) -> None:
+        step = StepFunction(problem.model.signals, problem.values)
+        super().__init__(problem, step)
+        self.evaluate = step.evaluate
+        for name, value in setting_values(problem.model.config).items():
+            step.inputs[name][:] = value

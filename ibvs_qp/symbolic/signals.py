@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import casadi as ca
@@ -49,6 +50,13 @@ class Signals:
         """Name a result of the step; returns it."""
         self.outputs[name] = value
         return value
+
+    def copy(self) -> Signals:
+        """The same symbols; what is named in the copy stays in it."""
+        other = copy.copy(self)
+        for name, table in vars(self).items():
+            setattr(other, name, dict(table))
+        return other
 
     @property
     def next_states(self) -> ca.SX:

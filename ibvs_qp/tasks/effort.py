@@ -16,7 +16,7 @@ class EffortTask(Task):
 
     def rows(self, model: Model) -> list[TaskRow]:
         """One row per rotor in newtons."""
-        return _thrust_rows(model, "effort", model.last_thrust, model.config.weights.effort)
+        return _thrust_rows(model, "effort", model.last_thrust, model.weights.effort)
 
 
 class SmoothnessTask(Task):
@@ -26,11 +26,11 @@ class SmoothnessTask(Task):
 
     def rows(self, model: Model) -> list[TaskRow]:
         """One row per rotor in newtons."""
-        return _thrust_rows(model, "smooth", model.extrapolated_thrust, model.config.weights.smoothness)
+        return _thrust_rows(model, "smooth", model.extrapolated_thrust, model.weights.smoothness)
 
 
-def _thrust_rows(model: Model, name: str, target: ca.SX, weight: float) -> list[TaskRow]:
+def _thrust_rows(model: Model, name: str, target: ca.SX, weight: ca.SX) -> list[TaskRow]:
     return [
-        TaskRow(name=f"{name}_{rotor}", unit="N", expression=model.thrust[i], target=target[i], weight=ca.SX(weight))
+        TaskRow(name=f"{name}_{rotor}", unit="N", expression=model.thrust[i], target=target[i], weight=weight)
         for i, rotor in enumerate(model.config.vehicle.geometry.names)
     ]

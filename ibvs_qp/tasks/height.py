@@ -42,7 +42,7 @@ class HeightTask(Task):
                 unit="m/s^2",
                 expression=ca.dot(model.wall.down, model.acceleration[:3]),
                 target=model.output("height_command", self.target(model)),
-                weight=ca.SX(model.config.weights.height),
+                weight=model.weights.height,
             )
         ]
 
@@ -50,7 +50,7 @@ class HeightTask(Task):
         """Vertical acceleration that lines and free velocity demand, averaged by weight [m/s^2]."""
         free, velocity = free_directions(model), velocity_command(model)
         rotation = model.body_rotation_gain * ca.vertcat(LevelTask().targets(model), YawTask().target(model))
-        sideways, guided = free[0] * velocity[0], 1.0 if model.config.weights.line else 0.0
+        sideways, guided = free[0] * velocity[0], model.weights.line > 0.0
         total, weight = free[1] * velocity[1], free[1]
         for line in model.lines:
             task = LineTask(line.index)

@@ -24,7 +24,7 @@ class LevelTask(Task):
                 unit="rad/s^2",
                 expression=model.acceleration[3 + axis],
                 target=targets[axis],
-                weight=ca.SX(model.config.weights.level),
+                weight=model.weights.level,
             )
             for axis, name in enumerate(("roll", "pitch"))
         ]

@@ -72,7 +72,7 @@ class LineTask(Task):
 
     def rows(self, model: Model) -> list[TaskRow]:
         """Two rows: error at the tip [1/s^2] and angle [rad/s^2]."""
-        line, weights, acceleration = line_state(model, self.index), model.config.weights, model.camera_acceleration
+        line, weights, acceleration = line_state(model, self.index), model.weights, model.camera_acceleration
         return [
             TaskRow(
                 name=self.name,
@@ -122,7 +122,7 @@ def line_state(model: Model, index: int) -> LineState:
 
 
 def _line_state(model: Model, line: Line) -> LineState:
-    view, weights = model.view, model.config.weights
+    view, weights = model.view, model.weights
     (x_tip, y_tip), (right, below) = view.tip, view.tip_place
     cos, sin = ca.cos(line.theta), ca.sin(line.theta)
     nominal = (right * ca.cos(line.theta_reference) + below * ca.sin(line.theta_reference)) / view.depth

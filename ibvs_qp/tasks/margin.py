@@ -44,7 +44,7 @@ class MarginTask(Task):
                 unit="N",
                 expression=directions[row, :] @ model.thrust,
                 target=target[row],
-                weight=ca.SX(model.config.weights.margin),
+                weight=model.weights.margin,
             )
             for row in range(basis.shape[1])
         ]

@@ -35,7 +35,7 @@ class PaperLineTask(LineTask):
     def rows(self, model: Model) -> list[TaskRow]:
         """Two rows: rho [1/s^2] and angle [rad/s^2]."""
         rho, angle = super().rows(model)
-        weight = model.config.weights.line * line_state(model, self.index).weight
+        weight = model.weights.line * line_state(model, self.index).weight
         changes: dict[str, Any] = {"weight": weight * _nearest(model)[self.index]}
         return [rho, TaskRow(**(vars(angle) | changes))]
 

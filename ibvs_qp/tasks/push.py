@@ -43,7 +43,7 @@ class PushTask(Task):
                 unit="N",
                 expression=model.force_along_normal,
                 target=model.output("push_command", self.force(model)),
-                weight=model.config.weights.push * model.contact_weight,
+                weight=model.weights.push * model.contact_weight,
             )
         ]
 

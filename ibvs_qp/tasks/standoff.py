@@ -64,7 +64,7 @@ class StandoffTask(Task):
                 unit="N",
                 expression=model.force_along_normal,
                 target=ca.if_else(tilted, lost, filtered),
-                weight=model.config.weights.push * (1.0 - model.contact_weight) * level,
+                weight=model.weights.push * (1.0 - model.contact_weight) * level,
             )
         ]
 

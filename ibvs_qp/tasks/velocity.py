@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 
-from ibvs_qp.config import Weights
 from ibvs_qp.model.inputs import LEAST_GAIN, clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
@@ -30,7 +31,7 @@ class VelocityTask(Task):
         """Two rows in m/s^2; a line of full weight takes the weight of its direction away."""
         paper = model.config.line_profile == "paper"  # there the rows are null-space targets and count in full
         free = ca.SX.ones(2) if paper else free_directions(model)
-        weights, target = model.config.weights, velocity_command(model)
+        weights, target = model.weights, velocity_command(model)
         extra = 0.0 if paper else model.tip_stationary * (stationary_sideways_weight(weights) - weights.velocity)
         # Without a rotor one force is not free, and the vehicle tilts to move: at the wall the one into it counts more.
         faulty = ca.fmax(model.attitude.tilted, model.attitude.trimmed)
@@ -48,13 +49,13 @@ class VelocityTask(Task):
         ]
 
 
-def stationary_sideways_weight(weights: Weights) -> float:
+def stationary_sideways_weight(weights: Any) -> ca.SX:
     """Weight of the sideways velocity row while friction holds the tip: that of height, if larger.
 
     The vehicle swings about a stationary tip, and this row damps the swing. A push beyond reach takes from every row
     by its weight: at the weight of a sliding vehicle and with stiff velocity gains 40 N make the yaw grow to 2.4 deg.
     """
-    return max(weights.velocity, weights.height) if weights.velocity else 0.0
+    return ca.if_else(weights.velocity > 0.0, ca.fmax(weights.velocity, weights.height), 0.0)
 
 
 def velocity_command(model: Model) -> ca.SX:

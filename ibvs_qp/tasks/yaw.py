@@ -32,7 +32,7 @@ class YawTask(Task):
                 unit="rad/s^2",
                 expression=model.acceleration[5],
                 target=model.output("yaw_command", self.target(model)),
-                weight=model.config.weights.yaw * ca.if_else(model.attitude.tilted, LOST_WEIGHT, 1.0),
+                weight=model.weights.yaw * ca.if_else(model.attitude.tilted, LOST_WEIGHT, 1.0),
             )
         ]
 

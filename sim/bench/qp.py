@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
+import warnings
 from collections.abc import Callable
 
 import numpy as np
+import qpsolvers
+from scipy import sparse
 
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, SolverSettings
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.solver import SOLVERS
 from ibvs_qp.controller import HybridController
 from ibvs_qp.qp.exact import ExactSolver
-from ibvs_qp.qp.offline import installed_solvers, qpsolvers_problem, solve_offline
-from ibvs_qp.symbolic.compiler import compiler
-from sim.bench.direct import direct_solvers
+from ibvs_qp.qp.problem import ProgramData, QpProblem
+from ibvs_qp.qp.solver import Solver, make_solver
+from ibvs_qp.symbolic.machine_code import compiler
 from sim.bench.reference_rival import mink_row
 from sim.bench.stages import stage_medians
 from sim.bench.ticks import Tick, by_flight, recorded_ticks
@@ -20,14 +26,14 @@ from sim.bench.timing import Bench, Row
 
 #: Ticks that warm a controller up before the measurement.
 WARM_UP = 500
-#: Rivals of qpsolvers; those not installed are skipped.
-RIVALS = ("osqp", "daqp", "quadprog", "proxqp", "piqp", "clarabel")
+#: Back ends of qpsolvers that take dense matrices only.
+DENSE = ("daqp", "quadprog")
 #: What a row of each kind times.
 TIMED = {
     "step": "the whole tick, whose stage solve compares with the direct rows",
     "qpsolvers_NAME": "through qpsolvers: assembly of the program with scipy.sparse, then the solver",
     "qpsolvers_assembly": "that assembly alone, for the solvers that take sparse matrices",
-    "direct_NAME": "the solver's own call on arrays that are ready",
+    "direct_NAME": "the solver of solver.name on the values of the tick, warm where its library has workspaces",
     "casadi_daqp": "DAQP through CasADi with its conversions, as in the exact fallback",
 }
 
@@ -93,9 +99,9 @@ def _rivals(
 ) -> tuple[list[Row], dict[str, dict[str, float]]]:
     """Times of the rivals on the controller's own programs, and thrust differences to the exact solver [N]."""
     problem, data = controller.problem, controller.engine.data
-    rows = {name: Row(name=f"qpsolvers_{name}") for name in RIVALS if name in installed_solvers()}
+    rows = {name: Row(name=f"qpsolvers_{name}") for name in SOLVERS if name in qpsolvers.available_solvers}
     exact_row, exact = Row(name="casadi_daqp"), ExactSolver(problem)
-    assembly_row, direct = Row(name="qpsolvers_assembly"), direct_solvers()
+    assembly_row, direct = Row(name="qpsolvers_assembly"), _direct_solvers(problem)
     direct_rows = {name: Row(name=f"direct_{name}") for name in direct}
     differences: dict[str, list[float]] = {}
     for index, (measurement, reference) in enumerate(by_flight(controller, ticks)):
@@ -106,12 +112,15 @@ def _rivals(
         part = "step_limited" if command.active_limits else "step_unlimited"
         answers = {"step": command.thrusts, part: command.thrusts}
         for name, row in rows.items():
-            answer = row.measure(lambda: solve_offline(problem, data, name))  # noqa: B023 - called at once
+            answer = row.measure(lambda: _through_qpsolvers(problem, data, name))  # noqa: B023 - called at once
             if answer is not None:
-                answers[name] = answer[0][: len(command.thrusts)]
+                answers[name] = answer[: len(command.thrusts)]
         assembly_row.measure(lambda: qpsolvers_problem(problem, data))
         for name, row in direct_rows.items():
-            answers[row.name] = row.measure(direct[name](data))[: len(command.thrusts)]
+            solver, initial = direct[name], None if command.active_limits else data.unlimited
+            answer = row.measure(lambda: solver.solve(data.p, data.q, data.a, data.lower, data.upper, initial))  # noqa: B023 - called at once
+            if answer is not None:
+                answers[row.name] = answer.x[: len(command.thrusts)]
         if found is None:
             continue
         for name, thrusts in answers.items():
@@ -122,6 +131,34 @@ def _rivals(
         if errors
     }
     return [*rows.values(), assembly_row, *direct_rows.values(), exact_row], figures
+
+
+def _direct_solvers(problem: QpProblem) -> dict[str, Solver]:
+    """Solvers of `solver.name` whose libraries are installed."""
+    found = {}
+    for name in SOLVERS:
+        with contextlib.suppress(ConfigError):
+            found[name] = make_solver(problem, SolverSettings(name=name))
+    return found
+
+
+def qpsolvers_problem(problem: QpProblem, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
+    """One tick's program in the form of qpsolvers: full P, two-sided rows stacked as G x <= h."""
+    upper_triangle, rows = problem.p_pattern.copy(), problem.a_pattern.copy()
+    upper_triangle.data, rows.data = data.p.copy(), data.a.copy()
+    hessian = sparse.csc_matrix(upper_triangle + sparse.triu(upper_triangle, 1).T)
+    stacked = sparse.csc_matrix(sparse.vstack((rows, -rows)))
+    bounds = np.concatenate((data.upper, -data.lower))
+    if dense:
+        return qpsolvers.Problem(hessian.toarray(), data.q.copy(), stacked.toarray(), bounds)
+    return qpsolvers.Problem(hessian, data.q.copy(), stacked, bounds)
+
+
+def _through_qpsolvers(problem: QpProblem, data: ProgramData, name: str) -> np.ndarray | None:
+    """Solution of one tick's program by a back end of qpsolvers, (variables,); None if it found none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # some warn that a sparse matrix is made dense
+        return qpsolvers.solve_problem(qpsolvers_problem(problem, data, name in DENSE), solver=name).x
 
 
 def _histogram(iterations: list[int]) -> dict[str, int]:

@@ -39,7 +39,7 @@ class Explain:
     seed: Annotated[int | None, optional("INT")] = None
     """Must equal the run's seed, if given."""
     solver: Annotated[str | None, optional("NAME")] = None
-    """Back end of qpsolvers that solves the tick; default: the exact solver."""
+    """Solver of the tick, a value of solver.name; default: the exact solver."""
     json: Annotated[bool, flag] = False
     """Print one JSON line on standard output, and nothing else."""
 

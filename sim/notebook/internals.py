@@ -16,6 +16,7 @@ from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.presser import Presser
 from ibvs_qp.qp.exact import ExactSolver
+from ibvs_qp.qp.solvers.osqp import osqp_settings
 
 #: A flight at the wall ends after this time in any case [s].
 LONGEST_S = 10.0
@@ -175,7 +176,7 @@ def exact_solver() -> Callable[[Program], tuple[np.ndarray, np.ndarray]]:
         found = solver.solve(*program.arrays[:5])
         if found is None:
             raise RuntimeError("a recorded program has no solution")
-        return found
+        return found.x, found.y
 
     return solve
 
@@ -195,12 +196,4 @@ def shipped_solver() -> Callable[[Program], Answer]:
 
 def shipped_osqp_settings() -> dict[str, float]:
     """The shipped settings of OSQP, under OSQP's own names."""
-    settings = ControllerConfig().solver
-    return {
-        "eps_abs": settings.tolerance,
-        "eps_rel": settings.relative_tolerance,
-        "max_iter": settings.max_iterations,
-        "check_termination": settings.check_interval,
-        "adaptive_rho_interval": settings.adaptive_rho_interval,
-        "scaling": settings.scaling,
-    }
+    return osqp_settings(ControllerConfig().solver)

@@ -8,9 +8,8 @@ from scipy import sparse
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.qp.accept import QpEngine
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, AcceptedSolution
+from ibvs_qp.qp.problem import ProgramData, QpProblem
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, AcceptedSolution
 from sim.rivals.priorities import PriorityProblem
 from sim.rivals.solver import BackedSolver
 
@@ -59,7 +58,7 @@ class CascadeEngine(QpEngine):
         """As after construction."""
         super().reset()
         for part in (self._first, *self._parts):
-            part.osqp.reset()
+            part.solver.reset()
 
     def solve(self) -> AcceptedSolution | None:
         """Solve the cascade of this tick; None if a level has no solution."""

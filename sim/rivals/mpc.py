@@ -12,7 +12,7 @@ from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.rivals.condensed import CondensedProgram
 from sim.rivals.horizon import MpcSettings
 from sim.rivals.prediction import Prediction
@@ -70,7 +70,7 @@ class MpcController(PaperController):
     def reset(self) -> None:
         """As after construction."""
         super().reset()
-        self._solver.osqp.reset()
+        self._solver.solver.reset()
 
     def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         setpoints, solver = self.setpoints, self._solver

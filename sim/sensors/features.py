@@ -15,7 +15,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 from ibvs_qp.painting.pattern import COLUMNS
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
 from sim.sensors.cameras.exposure import Dropouts
 from sim.sensors.cameras.protocol import Schedule, camera_intrinsics

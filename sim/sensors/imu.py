@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.quaternion import multiply
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.sensors.imu_errors import ImuErrors
 from sim.sensors.sample_clock import SampleClock
 from sim.world.errors import WorldErrors

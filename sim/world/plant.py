@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason, has_landed

@@ -8,7 +8,7 @@ from solver_checks import FREE_N, LIMITED_N, check_active, exact, stationarity
 
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.controller import HybridController
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, AcceptedSolution
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, AcceptedSolution
 from replay.broken import broken
 from replay.cases import CASES, DATA
 from replay.recordings import load

@@ -9,11 +9,11 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from c_binding import CController
 from recorded_inputs import recording
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController, qp_problem
-from ibvs_qp.export.binding import CController
 from ibvs_qp.export.library import write_library
 from ibvs_qp.export.recorded import write_recorded
 

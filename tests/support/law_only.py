@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import casadi as ca
 
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.symbolic.step_function import StepFunction
+from ibvs_qp.symbolic.function import StepFunction
 
 _laws: WeakKeyDictionary[Setpoints, StepFunction] = WeakKeyDictionary()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.controller import HybridController
-from ibvs_qp.qp.evaluator import ProgramData
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER, AcceptedSolution
+from ibvs_qp.qp.problem import ProgramData
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, AcceptedSolution
 
 #: Largest thrust difference to the exact solution on limited ticks and on all others [N].
 LIMITED_N, FREE_N = 2e-2, 1e-3
@@ -17,7 +17,7 @@ def exact(controller: HybridController) -> tuple[np.ndarray, np.ndarray]:
     data = controller.engine.data
     found = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
     assert found is not None
-    return found
+    return found.x, found.y
 
 
 def check_active(names: set[str], controller: HybridController, y: np.ndarray) -> None:

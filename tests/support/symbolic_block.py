@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.signals import Signals
-from ibvs_qp.symbolic.step_function import StepFunction
 
 DEFAULTS = {"attitude": (1.0, 0.0, 0.0, 0.0), "normal": (1.0, 0.0, 0.0), "dt": 0.004}
 DEFAULTS |= {"specific_force_known": 1.0, "velocity_known": 1.0}

@@ -33,12 +33,8 @@ extern const ibvs_real ibvs_mass_matrix[6][6], ibvs_allocation_weights[6];
 /* ibvs_tick.c, generated */
 void ibvs_tick(const ibvs_real *const *arguments, ibvs_real *const *results);
 
-/* clock.c */
-void ibvs_clock_reset(ibvs_controller *c);
-bool ibvs_clock_accept(ibvs_controller *c, int64_t stamp_ns);
-bool ibvs_sample_time(const ibvs_controller *c, int64_t stamp_ns, int64_t *time_ns);
-
 /* validate.c */
+void ibvs_clock_reset(ibvs_controller *c);
 bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
                             uint32_t *rejected);
 bool ibvs_check_reference(ibvs_controller *c, const ibvs_reference *given);
@@ -47,16 +43,10 @@ bool ibvs_check_gains(ibvs_controller *c);
 /* pack.c */
 void ibvs_pack(ibvs_controller *c, const ibvs_measurement *m);
 
-/* fallback.c */
+/* fallback.c; ibvs_allocate overwrites the program */
 void ibvs_hold_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS]);
 void ibvs_analytic_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS]);
-
-/* pseudo_inverse.c */
-void ibvs_apply_pseudo_inverse(const ibvs_real *rows, uint32_t count, ibvs_real *values, ibvs_real solution[6]);
-
-/* allocate.c */
-void ibvs_allocate(const ibvs_real free[IBVS_ROTORS], const ibvs_real *lower, const ibvs_real *upper,
+void ibvs_allocate(ibvs_controller *c, const ibvs_real *free, const ibvs_real *lower, const ibvs_real *upper,
                    ibvs_real thrusts[IBVS_ROTORS]);
-void ibvs_wrench(const ibvs_real thrusts[IBVS_ROTORS], ibvs_real wrench[6]);
 
 #endif

@@ -50,6 +50,15 @@ static bool beyond_limits(const ibvs_controller *c) {
   return false;
 }
 
+static void wrench_of(const ibvs_real u[IBVS_ROTORS], ibvs_real wrench[6]) {
+  for (uint32_t i = 0; i < 6; ++i) {
+    wrench[i] = 0;
+    for (uint32_t k = 0; k < IBVS_ROTORS; ++k) {
+      wrench[i] += ibvs_effectiveness[i][k] * u[k];
+    }
+  }
+}
+
 /* Thrusts within the window, and their report. */
 static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real thrusts[IBVS_ROTORS], bool limited,
                    ibvs_command *command) {
@@ -62,8 +71,8 @@ static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real th
     c->thrusts[i] = thrusts[i];
   }
   c->commanded = true;
-  ibvs_wrench(thrusts, command->wrench);
-  ibvs_wrench(beyond, command->unallocated_wrench);
+  wrench_of(thrusts, command->wrench);
+  wrench_of(beyond, command->unallocated_wrench);
   for (uint32_t i = 0; i < 6; ++i) {
     c->given_up = r_fmax(c->given_up, r_fabs(command->unallocated_wrench[i]));
   }
@@ -104,7 +113,7 @@ static void fall_back(ibvs_controller *c, ibvs_command *command) {
     hover(c, lower, upper, command);
     return;
   }
-  ibvs_allocate(free, lower, upper, thrusts);
+  ibvs_allocate(c, free, lower, upper, thrusts);
   command->outcome = IBVS_ANALYTIC_FALLBACK;
   memset(command->multipliers, 0, sizeof command->multipliers);
   finish(c, free, thrusts, true, command);

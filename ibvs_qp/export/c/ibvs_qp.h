@@ -130,9 +130,7 @@ typedef struct {
   ibvs_measurement last;
   ibvs_reference reference;
   /* pairs of lines and references */
-  int32_t pairs[IBVS_LINES];       /* reference of every index: role and order; -1 for none */
-  uint32_t role_count;
-  ibvs_role roles[IBVS_LINES];
+  int32_t pairs[IBVS_LINES]; /* reference of every index: role and order; -1 for none */
   /* tick */
   int64_t tick_ns;
   ibvs_real inputs[IBVS_INPUTS], states[IBVS_STATES], next_states[IBVS_STATES], finite[1], results[IBVS_RESULTS];

@@ -18,18 +18,6 @@ static int32_t key_of(const ibvs_reference *reference, uint32_t place) {
   return (int32_t)reference->lines[place].role * IBVS_LINES + order;
 }
 
-static bool same_roles(const ibvs_controller *c) {
-  if (c->role_count != c->reference.line_count) {
-    return false;
-  }
-  for (uint32_t i = 0; i < c->role_count; ++i) {
-    if (c->roles[i] != c->reference.lines[i].role) {
-      return false;
-    }
-  }
-  return true;
-}
-
 static int32_t index_of(const ibvs_controller *c, int32_t key) {
   for (int32_t index = 0; index < IBVS_LINES; ++index) {
     if (c->pairs[index] == key) {
@@ -42,13 +30,6 @@ static int32_t index_of(const ibvs_controller *c, int32_t key) {
 /* Give every reference its index; an index that changes its reference loses integral and rate. */
 static void assign(ibvs_controller *c) {
   const ibvs_reference *reference = &c->reference;
-  if (same_roles(c)) {
-    return;
-  }
-  c->role_count = reference->line_count;
-  for (uint32_t i = 0; i < reference->line_count; ++i) {
-    c->roles[i] = reference->lines[i].role;
-  }
   for (uint32_t index = 0; index < IBVS_LINES; ++index) {
     bool wanted = c->pairs[index] < 0;
     for (uint32_t i = 0; i < reference->line_count && !wanted; ++i) {

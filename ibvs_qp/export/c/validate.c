@@ -1,5 +1,61 @@
-/* Every input is checked; a refused one is replaced by its last accepted value. See ibvs_qp.validation. */
+/* Stamps to a time that only increases, and checks of all inputs: a refused one is replaced by its last accepted value.
+ * See ibvs_qp.validation. */
 #include "ibvs_internal.h"
+
+void ibvs_clock_reset(ibvs_controller *c) {
+  c->shift_ns = 0;
+  c->last_ns = -1;
+  c->odd_first = c->odd_last = -1;
+  c->odd_count = 0;
+}
+
+static bool is_stamp(int64_t stamp) { return stamp >= 0 && stamp < IBVS_STAMP_END; }
+
+static bool accept_stamp(ibvs_controller *c, int64_t stamp) {
+  if (!is_stamp(stamp)) {
+    return false;
+  }
+  if (c->last_ns < 0) { /* a first stamp near the end would leave no room for the time after it */
+    c->shift_ns = stamp >= IBVS_STAMP_END / 2 ? -stamp : 0;
+  }
+  const int64_t time = stamp + c->shift_ns;
+  if (c->last_ns < 0 || (time > c->last_ns && time - c->last_ns <= IBVS_LEAP_NS)) {
+    c->last_ns = time;
+    c->odd_count = 0;
+    return true;
+  }
+  const bool ahead = time > c->last_ns;
+  if (c->odd_count > 0 && stamp == c->odd_last) {
+    return false;
+  }
+  const bool follows = c->odd_count > 0 && stamp > c->odd_last && stamp - c->odd_last <= IBVS_LEAP_NS;
+  if (!follows) {
+    c->odd_first = stamp;
+    c->odd_count = 0;
+  }
+  const int64_t step = stamp - c->odd_last, passed = stamp - c->odd_first;
+  c->odd_last = stamp;
+  c->odd_count += 1;
+  if (!follows || !(ahead || (passed >= IBVS_RESTART_NS && c->odd_count >= IBVS_RESTART_STAMPS))) {
+    return false;
+  }
+  c->odd_count = 0;
+  c->last_ns += passed + step;
+  c->shift_ns = c->last_ns - stamp;
+  return true;
+}
+
+static bool sample_time(const ibvs_controller *c, int64_t stamp, int64_t *time_ns) {
+  if (!is_stamp(stamp)) {
+    return false;
+  }
+  const int64_t time = stamp + c->shift_ns;
+  if (time > c->last_ns + IBVS_LEAD_NS) {
+    return false;
+  }
+  *time_ns = time;
+  return true;
+}
 
 static ibvs_real *entries(void *structure, const ibvs_field *field) {
   return (ibvs_real *)(void *)((char *)structure + field->value);
@@ -68,7 +124,7 @@ static void check_plane(const ibvs_controller *c, ibvs_measurement *own, uint32_
   const bool good = ibvs_finite(plane, 4) && d != 0 && r_fabs(plane[0] / d) < IBVS_INVERSE_DEPTH_BOUND &&
                     r_fabs(plane[1] / d) < IBVS_INVERSE_DEPTH_BOUND && -plane[2] / d > IBVS_INVERSE_DEPTH_MIN &&
                     -plane[2] / d < IBVS_INVERSE_DEPTH_BOUND;
-  if (!good || !ibvs_sample_time(c, own->plane_stamp_ns, &own->plane_stamp_ns)) {
+  if (!good || !sample_time(c, own->plane_stamp_ns, &own->plane_stamp_ns)) {
     *rejected |= IBVS_REJECT_PLANE;
     own->has_plane = false;
   }
@@ -76,7 +132,7 @@ static void check_plane(const ibvs_controller *c, ibvs_measurement *own, uint32_
 
 /* A sample's stamp in the controller's time, unless the sample is too old. */
 static bool recent(const ibvs_controller *c, int64_t *stamp_ns) {
-  return ibvs_sample_time(c, *stamp_ns, stamp_ns) && c->last_ns - *stamp_ns <= IBVS_OLDEST_LINE_NS;
+  return sample_time(c, *stamp_ns, stamp_ns) && c->last_ns - *stamp_ns <= IBVS_OLDEST_LINE_NS;
 }
 
 static bool good_line(const ibvs_line *line) {
@@ -105,14 +161,14 @@ static void check_lines(const ibvs_controller *c, ibvs_measurement *own, uint32_
 
 bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
                             uint32_t *rejected) {
-  if (!ibvs_clock_accept(c, given->stamp_ns)) {
+  if (!accept_stamp(c, given->stamp_ns)) {
     *rejected |= IBVS_REJECT_STAMP;
     return false;
   }
   *own = *given;
   own->stamp_ns = c->last_ns;
   check_fields(c, own, rejected);
-  const bool in_time = ibvs_sample_time(c, given->wrench_stamp_ns, &own->wrench_stamp_ns);
+  const bool in_time = sample_time(c, given->wrench_stamp_ns, &own->wrench_stamp_ns);
   if (!in_time) {
     *rejected |= IBVS_REJECT_WRENCH_STAMP;
   }

@@ -38,6 +38,13 @@ typedef struct {
 /* The solution of the program's data; false where the data is no program, or no answer passes the acceptance test. */
 bool ibvs_solve(ibvs_program *program, ibvs_solution *solution);
 
+/* The same from arrays elsewhere, p, q, a, lower, upper, unlimited, for callers without this header. */
+uint32_t ibvs_program_size(void);
+bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], ibvs_solution *solution);
+
+/* The exact solution by an active set, from multipliers near those of the solution; false where it is not found. */
+bool ibvs_active_set(const ibvs_program *program, ibvs_real multipliers[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES]);
+
 /* Drop the iterate and the adapted step size. */
 void ibvs_program_reset(ibvs_program *program);
 

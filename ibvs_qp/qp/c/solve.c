@@ -1,10 +1,55 @@
-/* OSQP at every tick, and the acceptance test of its answer; see ibvs_qp.qp.osqp and ibvs_qp.qp.accept. */
+/* OSQP at every tick, and the acceptance test of its answer; see ibvs_qp.qp.solvers.osqp and ibvs_qp.qp.accept. */
 #include <string.h>
 
 #include "ibvs_math.h"
 #include "ibvs_program.h"
 
 #define BLOCK_TRIES 2 /* changes of all wrong rows that may leave their number as it is */
+
+bool ibvs_finite(const ibvs_real *values, uint32_t count) {
+  for (uint32_t i = 0; i < count; ++i) {
+    if (!isfinite(values[i])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Root of a symmetric positive definite matrix, in its place; false where it is none. */
+static bool cholesky(ibvs_real *m, uint32_t n) {
+  for (uint32_t j = 0; j < n; ++j) {
+    for (uint32_t i = j; i < n; ++i) {
+      ibvs_real sum = m[i * n + j];
+      for (uint32_t k = 0; k < j; ++k) {
+        sum -= m[i * n + k] * m[j * n + k];
+      }
+      if (i == j) {
+        if (!(sum > 0)) {
+          return false;
+        }
+        m[i * n + j] = r_sqrt(sum);
+      } else {
+        m[i * n + j] = sum / m[j * n + j];
+      }
+    }
+  }
+  return true;
+}
+
+static void cholesky_solve(const ibvs_real *root, uint32_t n, ibvs_real *x) {
+  for (uint32_t i = 0; i < n; ++i) {
+    for (uint32_t k = 0; k < i; ++k) {
+      x[i] -= root[i * n + k] * x[k];
+    }
+    x[i] /= root[i * n + i];
+  }
+  for (uint32_t i = n; i-- > 0;) {
+    for (uint32_t k = i + 1; k < n; ++k) {
+      x[i] -= root[k * n + i] * x[k];
+    }
+    x[i] /= root[i * n + i];
+  }
+}
 
 static bool good_data(const ibvs_program *program) {
   if (!ibvs_finite(program->p, IBVS_P_NONZEROS) || !ibvs_finite(program->q, IBVS_VARIABLES) ||
@@ -77,7 +122,7 @@ static bool solve_active(const ibvs_program *program, const ibvs_real *root, con
     }
     if (!known[i]) {
       fill_row(program, i, along[i]);
-      ibvs_cholesky_solve(root, IBVS_VARIABLES, along[i]);
+      cholesky_solve(root, IBVS_VARIABLES, along[i]);
       known[i] = true;
     }
     active[count] = i;
@@ -94,10 +139,10 @@ static bool solve_active(const ibvs_program *program, const ibvs_real *root, con
       square[i * count + j] = at[active[i]];
     }
   }
-  if (!ibvs_cholesky(square, count)) {
+  if (!cholesky(square, count)) {
     return false;
   }
-  ibvs_cholesky_solve(square, count, level);
+  cholesky_solve(square, count, level);
   for (uint32_t i = 0; i < count; ++i) {
     y[active[i]] = level[i];
     for (uint32_t k = 0; k < IBVS_VARIABLES; ++k) {
@@ -124,11 +169,11 @@ static int8_t side_of(const ibvs_program *program, uint32_t row, int8_t side, ib
   return at > program->upper[row] + slip ? 1 : (at < program->lower[row] - slip ? -1 : 0);
 }
 
-/* The exact solution, from OSQP's multipliers, by block principal pivoting (Judice and Pires, 1994): all rows that are
+/* The exact solution, from multipliers near it, by block principal pivoting (Judice and Pires, 1994): all rows that are
  * on the wrong side change it at once; where that does not reduce their number, only the last of them, which ends for
  * every positive definite program. Where the iteration stopped early it takes OSQP's place; in single precision it
  * leaves a tenth of the rounding errors. False where IBVS_PASSES do not suffice. */
-static bool refine(const ibvs_program *program, ibvs_real y[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES]) {
+bool ibvs_active_set(const ibvs_program *program, ibvs_real y[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES]) {
   ibvs_real root[IBVS_VARIABLES * IBVS_VARIABLES], along[IBVS_ROWS][IBVS_VARIABLES], at[IBVS_ROWS], length[IBVS_ROWS];
   bool known[IBVS_ROWS] = {false}, factored = false;
   int8_t side[IBVS_ROWS], next[IBVS_ROWS];
@@ -140,7 +185,7 @@ static bool refine(const ibvs_program *program, ibvs_real y[IBVS_ROWS], ibvs_rea
   fill_hessian(program, root);
   for (uint32_t pass = 0; pass < IBVS_PASSES; ++pass) {
     const bool needed = any_side(side);
-    if ((needed && !factored && !ibvs_cholesky(root, IBVS_VARIABLES)) ||
+    if ((needed && !factored && !cholesky(root, IBVS_VARIABLES)) ||
         !solve_active(program, root, side, along, known, x, y)) {
       return false;
     }
@@ -194,10 +239,10 @@ static ibvs_real dual_residual(const ibvs_program *program, const ibvs_real *x, 
       vector[column] += program->a[k] * y[ibvs_a_rows[k]];
     }
   }
-  if (!ibvs_cholesky(matrix, IBVS_VARIABLES)) {
+  if (!cholesky(matrix, IBVS_VARIABLES)) {
     return INFINITY;
   }
-  ibvs_cholesky_solve(matrix, IBVS_VARIABLES, vector);
+  cholesky_solve(matrix, IBVS_VARIABLES, vector);
   for (uint32_t i = 0; i < IBVS_VARIABLES; ++i) {
     largest = r_fmax(largest, r_fabs(x[i] + vector[i]));
   }
@@ -275,7 +320,7 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
   const bool good = accepted(program, solver, &solution->outcome);
   const bool sound = ibvs_finite(y, IBVS_ROWS) && has_iterate(solver);
   memcpy(solution->multipliers, y, sizeof solution->multipliers);
-  if (sound && (IBVS_FLOAT || !good) && refine(program, solution->multipliers, solution->x)) {
+  if (sound && (IBVS_FLOAT || !good) && ibvs_active_set(program, solution->multipliers, solution->x)) {
     solution->outcome = good ? solution->outcome : IBVS_REFINED;
   } else if (good) {
     memcpy(solution->multipliers, y, sizeof solution->multipliers);
@@ -288,4 +333,16 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
     solution->thrusts[i] = r_fmin(r_fmax(solution->x[i], program->lower[i]), program->upper[i]);
   }
   return true;
+}
+
+uint32_t ibvs_program_size(void) { return (uint32_t)sizeof(ibvs_program); }
+
+bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], ibvs_solution *solution) {
+  memcpy(program->p, values[0], sizeof program->p);
+  memcpy(program->q, values[1], sizeof program->q);
+  memcpy(program->a, values[2], sizeof program->a);
+  memcpy(program->lower, values[3], sizeof program->lower);
+  memcpy(program->upper, values[4], sizeof program->upper);
+  memcpy(program->unlimited, values[5], sizeof program->unlimited);
+  return ibvs_solve(program, solution);
 }

@@ -131,7 +131,8 @@ def test_the_allocation_of_the_fallback_is_the_nearest_wrench() -> None:
         free, lower = rng.uniform(-20.0, 60.0, 6), rng.uniform(0.0, 10.0, 6)
         upper = lower + rng.uniform(0.01, 30.0, 6)
         found = (ctypes.c_double * 6)()
-        own._library.ibvs_allocate(*((ctypes.c_double * 6)(*values) for values in (free, lower, upper)), found)
+        given = ((ctypes.c_double * 6)(*values) for values in (free, lower, upper))
+        own._library.ibvs_allocate(own._instance, *given, found)
         best = allocate_least_squares(matrix @ free, matrix, lower, upper)
         costs = [np.linalg.norm(weights * (matrix @ (np.array(u) - free))) for u in (found, best)]
         assert (lower <= np.array(found)).all() and (np.array(found) <= upper).all()

@@ -7,8 +7,8 @@ import math
 import casadi as ca
 import pytest
 
+from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.signals import Signals
-from ibvs_qp.symbolic.step_function import StepFunction
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])

@@ -8,7 +8,7 @@ from controller_scenes import pack, random_tick
 from solver_checks import LIMITED_N, check_active, exact
 
 from ibvs_qp.controller import HybridController
-from ibvs_qp.qp.solution import ACTIVE_MULTIPLIER
+from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER
 
 
 @pytest.mark.parametrize("window", [(2.0, 30.0), (8.0, 13.0)])

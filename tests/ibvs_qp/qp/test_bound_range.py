@@ -10,9 +10,8 @@ from small_vehicle import SmallVehicle
 
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
-from ibvs_qp.qp.bound_range import BoundRange, bound_ranges
 from ibvs_qp.qp.exact import ExactSolver
-from ibvs_qp.qp.explain import TickReplay
+from ibvs_qp.qp.explain import BoundRange, TickReplay, bound_ranges
 
 VARIABLES, ROWS = 6, 9
 #: Beside the end of a range, as a fraction of it: the set of active limits is looked at on both sides.
@@ -41,7 +40,7 @@ class Program:
         found = self._solver.solve(p, self.q, self.rows.T.ravel(), lower, upper)
         if found is None:
             return None
-        x, y = found
+        x, y = found.x, found.y
         return float(0.5 * x @ self.hessian @ x + self.q @ x), x, y
 
     def ranges(self) -> tuple[np.ndarray, dict[int, BoundRange]]:

@@ -16,13 +16,13 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from ibvs_qp.qp.compiled import CompiledSolver
-from ibvs_qp.symbolic import compiler
+from ibvs_qp.symbolic import machine_code
 from tests.replay.cases import CASES
 
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiler, "PATIENCE_S", 300.0)  # on a busy machine
+    monkeypatch.setattr(machine_code, "PATIENCE_S", 300.0)  # on a busy machine
 
 
 @needs_compiler
@@ -30,7 +30,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_recorded_flights_are_the_same_to_the_bit(case: str) -> None:
     config, flight = CASES[case].config().controller, recording(case)
     python, own = HybridController(config), HybridController(config.on_backend("compiled"))
-    assert isinstance(own.engine.osqp, CompiledSolver)
+    assert isinstance(own.engine.solver, CompiledSolver)
     for measurement, reference in zip(flight.measurements, flight.references, strict=True):
         command, other = python.step(measurement, reference), own.step(measurement, reference)
         np.testing.assert_array_equal(other.thrusts, command.thrusts)
@@ -79,7 +79,7 @@ def test_without_a_compiler_python_serves_and_one_line_says_so(
     monkeypatch.setenv("CC", "no-such-compiler")
     with caplog.at_level(logging.INFO):
         controller = HybridController(ControllerConfig().on_backend("compiled"))
-    assert not isinstance(controller.engine.osqp, CompiledSolver)
+    assert not isinstance(controller.engine.solver, CompiledSolver)
     said = [record.getMessage() for record in caplog.records if "OSQP" in record.getMessage()]
     assert said == ["no C compiler: OSQP runs in its Python extension"]
     assert controller.step(measured(0), Reference()).outcome == "solved"

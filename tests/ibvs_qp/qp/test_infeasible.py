@@ -17,9 +17,9 @@ from ibvs_qp.limits import Limit
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow
-from ibvs_qp.qp.evaluator import ProgramData
 from ibvs_qp.qp.explain import TickReplay
 from ibvs_qp.qp.infeasible import conflicting_rows
+from ibvs_qp.qp.problem import ProgramData
 
 HARD = ControllerConfig(limits=LimitSettings(hard_barriers=True))
 WORDS = "limits: no solution keeps all of "

@@ -16,7 +16,7 @@ from ibvs_qp.controller import HybridController
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 controller, caught = HybridController(), 0
 pack(controller, *random_tick(np.random.default_rng(0), 2))
-data, solver = controller.engine.data, controller.engine.osqp
+data, solver = controller.engine.data, controller.engine.solver
 while caught < 4:
     try:
         print("solving", file=sys.stderr, flush=True)

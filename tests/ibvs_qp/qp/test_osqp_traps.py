@@ -40,9 +40,11 @@ from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.thrust_window import thrust_window
-from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
-from ibvs_qp.qp.solution import BOUND_SLIP
+from ibvs_qp.qp.solver import BOUND_SLIP, Solution
+from ibvs_qp.qp.solvers.osqp import OUTCOMES, OsqpSolver
 
+#: Status value of OSQP.
+SOLVED = 1
 #: What OSQP 1.1 writes into x when it found no solution: its NaN pattern read as a number.
 GARBAGE = 2143289344.0
 
@@ -171,9 +173,9 @@ def test_an_infeasible_program_is_never_believed() -> None:
     p, q, a, lower, upper = data_of(controller)
     solver = OsqpSolver(controller.problem, controller.config.solver)
     raw = solver.solve(p, q, np.zeros_like(a), np.full_like(lower, 1.0), np.full_like(upper, 2.0))  # 0 x >= 1
-    assert raw is not None and raw.status != SOLVED
+    assert raw is not None and raw.status is None
     assert np.isfinite(raw.x).all() and np.abs(raw.x).max() == GARBAGE
-    assert controller.engine.accepts(replace(raw, y=np.zeros(len(lower)))) is None
+    assert controller.engine.accepts(raw._replace(y=np.zeros(len(lower)))) is None
 
 
 def test_garbage_with_a_good_status_does_not_fly_either() -> None:
@@ -181,7 +183,7 @@ def test_garbage_with_a_good_status_does_not_fly_either() -> None:
     rows = len(engine.data.lower)
 
     def outcome(status: int, x: np.ndarray, y: np.ndarray) -> Outcome | None:
-        return engine.accepts(RawSolution(x=x, y=y, status=status, iterations=1, seconds=0.0))
+        return engine.accepts(Solution(x=x, y=y, status=OUTCOMES.get(status), iterations=1))
 
     for value in (GARBAGE, math.nan, math.inf, -math.inf):
         assert outcome(SOLVED, np.full(9, value), np.zeros(rows)) is None
@@ -194,8 +196,8 @@ def test_garbage_with_a_good_status_does_not_fly_either() -> None:
         assert outcome(status, inside, np.zeros(rows)) is None
 
 
-@pytest.mark.parametrize("status", [SOLVED, SOLVED_INACCURATE, MAX_ITERATIONS])
-def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: int) -> None:
+@pytest.mark.parametrize("status", OUTCOMES.values())
+def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: Outcome) -> None:
     """All thrusts within their boxes and no dual residual: a barrier without slack is broken none the less."""
     hard = ControllerConfig(limits=LimitSettings(hard_barriers=True))
     engine, row = flying(config=hard).engine, 6
@@ -209,7 +211,7 @@ def test_an_iterate_that_breaks_a_hard_row_does_not_fly(status: int) -> None:
         for side in (data.upper, data.lower):
             kept = side[row]
             side[row] = at - distance * newton if side is data.upper else at + distance * newton
-            raw = RawSolution(x=x, y=prices, status=status, iterations=1, seconds=0.0)
+            raw = Solution(x=x, y=prices, status=status, iterations=1)
             assert (engine.accepts(raw) is not None) == flies
             side[row] = kept
 
@@ -222,12 +224,12 @@ def test_data_that_is_not_finite_never_reaches_the_workspace(place: int, value: 
     clean, solver = (solver_of(controller, direct) for _ in range(2))
     data = data_of(controller)
     for one in (solver, clean):
-        assert one.solve(*data).status == SOLVED  # type: ignore[union-attr]
+        assert one.solve(*data).status is Outcome.SOLVED  # type: ignore[union-attr]
     broken = [array.copy() for array in data]
     broken[place][1] = value
     assert solver.solve(*broken) is None
     after, expected = solver.solve(*data), clean.solve(*data)
-    assert after is not None and expected is not None and after.status == SOLVED
+    assert after is not None and expected is not None and after.status is Outcome.SOLVED
     np.testing.assert_array_equal(after.x, expected.x)  # as if the bad tick had never been
 
 
@@ -362,8 +364,8 @@ CUT_SHORT = SolverSettings(max_iterations=1, check_interval=1)
 
 def from_the_last_solution(controller: HybridController) -> HybridController:
     """A controller whose solver starts from the last solution at every tick, and so needs many iterations."""
-    solve = controller.engine.osqp.solve
-    controller.engine.osqp.solve = lambda *data, initial=None: solve(*data)  # type: ignore[method-assign]
+    solve = controller.engine.solver.solve
+    controller.engine.solver.solve = lambda *data, initial=None: solve(*data)  # type: ignore[method-assign]
     return controller
 
 
@@ -408,7 +410,7 @@ def test_a_capped_solution_that_flies_is_as_near_as_promised() -> None:
 
 def test_without_any_solver_the_analytic_law_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     controller = flying()
-    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data, initial: None)
+    monkeypatch.setattr(controller.engine.solver, "solve", lambda *data, initial: None)
     command = controller.step(measured(6), Reference(lines=line_references(2)))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK
     np.testing.assert_allclose(command.thrusts, analytic_thrusts(controller.setpoints), atol=1e-9)
@@ -418,7 +420,7 @@ def test_the_tolerance_of_the_solver_takes_no_thrust_out_of_its_window(monkeypat
     controller, solve = flying(), OsqpSolver.solve
     upper, shift = controller.engine.data.upper[:6], 0.5 * BOUND_SLIP
 
-    def beyond(self: OsqpSolver, *data: np.ndarray, initial: np.ndarray | None = None) -> RawSolution | None:
+    def beyond(self: OsqpSolver, *data: np.ndarray, initial: np.ndarray | None = None) -> Solution | None:
         raw = solve(self, *data, initial=initial)
         assert raw is not None
         raw.x[:6] = upper + shift
@@ -436,7 +438,7 @@ def test_the_analytic_law_keeps_to_what_a_weak_rotor_has(monkeypatch: pytest.Mon
     controller = HybridController()
     for tick in range(5):
         controller.step(measured(tick, thrust_max=weak), Reference(lines=line_references(2)))
-    monkeypatch.setattr(controller.engine.osqp, "solve", lambda *data, initial: None)
+    monkeypatch.setattr(controller.engine.solver, "solve", lambda *data, initial: None)
     command = controller.step(measured(6, thrust_max=weak), Reference(lines=line_references(2)))
     assert command.outcome is Outcome.ANALYTIC_FALLBACK and command.thrusts[2] <= 8.0 + 1e-9
     assert (command.thrusts >= FLOOR).all() and command.active_limits[0].name.startswith("thrust_")

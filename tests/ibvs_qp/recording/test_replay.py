@@ -16,8 +16,8 @@ import ibvs_qp.recording.writer
 from ibvs_qp import ControllerConfig, HybridController, Pilot, PilotConfig, SafetySettings, preset
 from ibvs_qp.command import SafetyState
 from ibvs_qp.config.errors import ConfigError, IbvsQpError
-from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.files import parse_toml
+from ibvs_qp.config.settings import from_dict
 from ibvs_qp.recording import Recorder, compare_preset, read_log, repair, replay
 from sim.commands.cli import main
 from tests.replay.cases import CASES

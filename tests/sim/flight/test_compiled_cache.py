@@ -15,7 +15,7 @@ from pathlib import Path
 import casadi as ca
 import pytest
 
-from ibvs_qp.symbolic import compiler as compiler_module
+from ibvs_qp.symbolic import machine_code as compiler_module
 from ibvs_qp.symbolic.machine_code import machine_code
 
 pytestmark = [

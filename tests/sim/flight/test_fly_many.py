@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from closed_loop_rigs import short_scene
 
-from ibvs_qp.symbolic.bound_function import BoundFunction
+from ibvs_qp.symbolic.function import BoundFunction
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import Trace

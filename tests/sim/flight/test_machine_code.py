@@ -14,7 +14,6 @@ from small_vehicle import SmallVehicle
 from ibvs_qp.analytic import PaperController
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.symbolic import compiler
 from ibvs_qp.symbolic import machine_code as module
 from ibvs_qp.symbolic.machine_code import machine_code
 
@@ -24,7 +23,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("IBVS_QP_CACHE", str(tmp_path))
-    monkeypatch.setattr(compiler, "PATIENCE_S", 300.0)  # on a busy machine
+    monkeypatch.setattr(module, "PATIENCE_S", 300.0)  # on a busy machine
     monkeypatch.delenv("CC", raising=False)
     return tmp_path
 
