@@ -47,11 +47,27 @@ class OsqpSolver:
         rows, variables = problem.a_pattern.toarray().shape
         self._lengths = (problem.p_pattern.nnz, variables, problem.a_pattern.nnz, rows, rows)
         self._no_multipliers = np.zeros(rows)
-        self._reset_pending = True
+        self._iterate = np.zeros(variables), self._no_multipliers
+        self.reset()
 
     def reset(self) -> None:
         """Drop the iterate and the adapted step size: the next solve is as after construction."""
         self._reset_pending = True
+        self._start: tuple[np.ndarray, np.ndarray, float] | None = None  # x, y and step size of the next set-up
+
+    def save_memory(self) -> tuple[np.ndarray, np.ndarray, float] | None:
+        """State of a flight: iterate and step size, from which the next solve sets up anew, here as in every copy.
+
+        OSQP's workspace cannot be copied; a set-up from these differs from it by rounding.
+        """
+        if not self._reset_pending:
+            x, y = self._iterate
+            self._start, self._reset_pending = (x, y, self._solver.settings.rho), True
+        return self._start
+
+    def load_memory(self, start: tuple[np.ndarray, np.ndarray, float] | None) -> None:
+        """Continue from a state."""
+        self._start, self._reset_pending = start, True
 
     def _setup(self, p: np.ndarray, q: np.ndarray, a: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
         settings, problem = self._settings, self._problem
@@ -74,11 +90,15 @@ class OsqpSolver:
             scaling=settings.scaling,
             check_dualgap=False,  # costs of 1e5 make it a test of rounding; the residuals bound the thrust error
             warm_starting=True,
+            **({} if self._start is None else {"rho": self._start[2]}),
         )
         self._reset_pending = False
         # The wrapper copies twenty fields of information per solve: 30 % more time per step. The extension object is
         # private; where a release of OSQP has none, the public interface is used.
         self._inner = getattr(self._solver, "_solver", None) if settings.direct else None
+        if self._start is not None:
+            self.warm_start(*self._start[:2])
+            self._start = None
 
     def solve(
         self,
@@ -127,13 +147,14 @@ class OsqpSolver:
             x, y = np.array(solution.x), np.array(solution.y)
         if info.status_val == INTERRUPTED:
             signal.raise_signal(signal.SIGINT)
+        self._iterate = x, y
         return RawSolution(x, y, int(info.status_val), int(info.iter), time.perf_counter() - start)
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
         """Replace the iterate, unless the next solve sets up anew."""
         if self._reset_pending:
             return
-        x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
+        self._iterate = x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
         if self._inner is not None:
             self._inner.warm_start(x, y)
         else:

@@ -38,6 +38,10 @@ typedef struct {
 /* The solution of the program's data; false where the data is no program, or no answer passes the acceptance test. */
 bool ibvs_solve(ibvs_program *program, ibvs_solution *solution);
 
+/* The same with OSQP set up anew from an iterate and a step size: continues another instance's solves. */
+bool ibvs_solve_from(ibvs_program *program, const ibvs_real *x, const ibvs_real *multipliers, ibvs_real rho,
+                     ibvs_solution *solution);
+
 /* Drop the iterate and the adapted step size. */
 void ibvs_program_reset(ibvs_program *program);
 

@@ -250,9 +250,8 @@ void ibvs_warm_start(ibvs_program *program, const ibvs_real *x, const ibvs_real 
 
 void ibvs_program_reset(ibvs_program *program) { program->ready = program->limited = false; }
 
-bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
-  const ibvs_real no_multipliers[IBVS_ROWS] = {0};
-  solution->iterations = -1;
+/* The program's data into OSQP; false where it is no program. */
+static bool load(ibvs_program *program) {
   if (!good_data(program)) {
     return false;
   }
@@ -266,6 +265,12 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
     ibvs_program_reset(program);
     return false;
   }
+  return true;
+}
+
+static bool solve_loaded(ibvs_program *program, ibvs_solution *solution) {
+  const ibvs_real no_multipliers[IBVS_ROWS] = {0};
+  OSQPSolver *solver = &program->solver.solver;
   if (!program->limited && ibvs_finite(program->unlimited, IBVS_VARIABLES)) {
     (void)osqp_warm_start(solver, program->unlimited, no_multipliers);
   }
@@ -288,4 +293,21 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
     solution->thrusts[i] = r_fmin(r_fmax(solution->x[i], program->lower[i]), program->upper[i]);
   }
   return true;
+}
+
+bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
+  solution->iterations = -1;
+  return load(program) && solve_loaded(program, solution);
+}
+
+bool ibvs_solve_from(ibvs_program *program, const ibvs_real *x, const ibvs_real *multipliers, ibvs_real rho,
+                     ibvs_solution *solution) {
+  solution->iterations = -1;
+  ibvs_program_reset(program);
+  if (!load(program)) {
+    return false;
+  }
+  (void)osqp_update_rho(&program->solver.solver, rho);
+  ibvs_warm_start(program, x, multipliers);
+  return solve_loaded(program, solution);
 }
