@@ -20,6 +20,7 @@ class StepFunction:
         inputs, states, outputs: Views by name; write inputs with ``[:] =``, outputs hold after `evaluate`.
         point: All inputs and states of the last evaluation in one column: together they reproduce the step.
         results: All outputs in one column; starts: place of the first entry of each.
+        size: Numbers in all of them.
         extra: Arrays of the additional results, in their order.
     """
 
@@ -41,12 +42,22 @@ class StepFunction:
         self.outputs = {name: self.results[place] for name, place in places(signals.outputs).items()}
         self.starts = {name: place.start for name, place in places(signals.outputs).items()}
         self._start = np.concatenate([*signals.starts.values(), np.zeros(0)])
+        self.size = sum(array.size for array in self.save_memory())
         self.reset()
 
     def reset(self) -> None:
         """Set the states to their start values."""
         self._state[:] = self._next[:] = self._start
         self._sum[0] = 0.0
+
+    def save_memory(self) -> list[np.ndarray]:
+        """State of a flight: of the memory that the function is bound to."""
+        return [self.point, self._next, self._sum, self.results, *self.extra]
+
+    def load_memory(self, values: list[np.ndarray]) -> None:
+        """Continue from a state."""
+        for own, value in zip(self.save_memory(), values, strict=True):
+            own[:] = value
 
     def advance(self) -> None:
         """Move on to the states that the last evaluation computed; they stay where one of them is not finite."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import cv2
 import numpy as np
@@ -46,8 +47,19 @@ class CoarseGrid:
         self.places = np.stack((along, across), axis=2).astype(np.int16)
         self.pixels = along, across
         self.free = self.sample(mask) == 0
+        self._remember()
+
+    def _remember(self) -> None:
         self._some = functools.lru_cache(maxsize=1)(self._make_some)
         self._windows = functools.lru_cache(maxsize=_REMEMBERED)(self._make_windows)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is remembered: a snapshot of a flight may be pickled."""
+        return {name: value for name, value in vars(self).items() if not callable(value)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._remember()
 
     def sample(self, picture: np.ndarray) -> np.ndarray:
         """Values of a picture at the samples, (rows, columns, ...)."""
