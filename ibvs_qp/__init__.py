@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from allocation import TAROT_T960, RotorGeometry, control_effectiveness
     from ibvs_qp.analytic import PaperController
-    from ibvs_qp.assured import Assured
     from ibvs_qp.command import ActiveLimit, Command, Outcome, SafetyState, TaskReport
     from ibvs_qp.config import ControllerConfig, SafetySettings
     from ibvs_qp.config.errors import ConfigError, IbvsQpError
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from ibvs_qp.painting.strategy import Strategy
     from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
     from ibvs_qp.presets import preset
+    from ibvs_qp.supervision.assured import Assured
 
 __all__ = [
     "TAROT_T960",
@@ -70,7 +70,7 @@ __all__ = [
 _HOMES = {
     "allocation": ("TAROT_T960", "RotorGeometry", "control_effectiveness"),
     "ibvs_qp.analytic": ("PaperController",),
-    "ibvs_qp.assured": ("Assured",),
+    "ibvs_qp.supervision.assured": ("Assured",),
     "ibvs_qp.command": ("ActiveLimit", "Command", "Outcome", "SafetyState", "TaskReport"),
     "ibvs_qp.config.controller": ("ControllerConfig",),
     "ibvs_qp.config.safety": ("SafetySettings",),

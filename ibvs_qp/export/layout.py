@@ -9,10 +9,10 @@ from ibvs_qp.analytic import RANK_TOLERANCE
 from ibvs_qp.config import ControllerConfig, Gains
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.frames import GRAVITY
+from ibvs_qp.model.hover import hover_gains
 from ibvs_qp.model.setpoints import ANY_STEP
 from ibvs_qp.model.tick import LINE
 from ibvs_qp.qp.problem import QpProblem
-from ibvs_qp.safety.hover import hover_gains
 from ibvs_qp.symbolic.literals import real
 from ibvs_qp.symbolic.signals import places
 from ibvs_qp.validation import clock, geometry

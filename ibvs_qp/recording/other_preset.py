@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import PilotConfig
@@ -17,6 +16,7 @@ from ibvs_qp.recording.comparison import step, unbroken
 from ibvs_qp.recording.header import ASSURED, LAWS, PILOT, flown_controller
 from ibvs_qp.recording.reader import RecordedFlight
 from ibvs_qp.recording.ticks import STEP
+from ibvs_qp.supervision.assured import Assured
 
 
 @dataclass(kw_only=True)

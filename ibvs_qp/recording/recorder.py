@@ -6,7 +6,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command
 from ibvs_qp.pilot import LawCall, Pilot
@@ -15,6 +14,7 @@ from ibvs_qp.recording.snapshot import copied
 from ibvs_qp.recording.ticks import RESET, STEP, SUPERVISOR, ControllerInput
 from ibvs_qp.recording.topics import TickTopics
 from ibvs_qp.recording.writer import PICTURE_ROOM, LogWriter
+from ibvs_qp.supervision.assured import Assured
 
 
 class Recorder:

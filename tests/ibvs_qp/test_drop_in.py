@@ -63,7 +63,7 @@ def test_importing_the_controller_adds_little_to_numpy_casadi_and_osqp() -> None
     assert added - set(sys.stdlib_module_names) == {"allocation", "ibvs_qp", "tomli_w"}
     # Of the own packages only what flies: no painting strategy or pilot, and of vision one matrix.
     parts = {name for name in modules if name.split(".")[0] == "ibvs_qp"}
-    assert not parts & {"ibvs_qp.painting.painter", "ibvs_qp.pilot", "ibvs_qp.safety.rotor_loss"}
+    assert not parts & {"ibvs_qp.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_loss"}
     assert not any(name.startswith("ibvs_qp.vision") for name in parts)
     # scipy.sparse comes with OSQP, the heavy parts of scipy with nothing.
     public = {name.split(".")[1] for name in modules if name.startswith("scipy.")}

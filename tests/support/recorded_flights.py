@@ -8,8 +8,8 @@ from typing import Any
 
 from recorded_inputs import recording
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.recording import Recorder
+from ibvs_qp.supervision.assured import Assured
 from tests.replay.broken import broken
 from tests.replay.cases import CASES
 

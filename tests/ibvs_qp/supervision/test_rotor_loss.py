@@ -11,7 +11,7 @@ from allocation.effectiveness import control_effectiveness
 from allocation.least_squares import allocate_least_squares
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.safety.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss
+from ibvs_qp.supervision.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss
 
 VEHICLE = VehicleParams()
 LOWER, UPPER = np.full(6, 1.2), np.full(6, 52.56)

@@ -14,10 +14,10 @@ from hostile_values import Raising
 from references import good_reference
 from small_vehicle import SmallVehicle
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.supervision.assured import Assured
 
 RATE_STEP = 500.0 * 0.004
 
@@ -62,7 +62,7 @@ def test_a_failing_monitor_is_named_and_the_thrusts_of_the_law_fly(monkeypatch: 
     def fails(*_: Any) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(assured.assurance, "watch", fails)
+    monkeypatch.setattr(assured.supervision, "watch", fails)
     for _ in range(5):
         seen = vehicle.measure()
         command = assured.step(seen, good_reference())

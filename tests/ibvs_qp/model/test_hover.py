@@ -12,7 +12,7 @@ from allocation.effectiveness import control_effectiveness
 from ibvs_qp.analysis.motion_loop import MotionLoop
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.motion_margin import TICKS_LATE
-from ibvs_qp.safety.hover import hold_thrusts, hover_gains
+from ibvs_qp.model.hover import hold_thrusts, hover_gains
 
 CONFIG = ControllerConfig()
 MATRIX = control_effectiveness(CONFIG.vehicle.geometry)

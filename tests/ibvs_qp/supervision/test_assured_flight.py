@@ -11,11 +11,11 @@ import pytest
 from controller_scenes import FLOOR, line_references
 from small_vehicle import SmallVehicle
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import Inputs
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.supervision.assured import Assured
 
 PRESS = Reference(push_force=5.0, contact=True, lines=line_references(2))
 NAN = np.full(3, np.nan)
