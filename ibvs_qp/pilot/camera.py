@@ -105,7 +105,7 @@ class CameraInput:
         frame: SensorFrame,
         velocity: np.ndarray | None,
         hints: tuple[LineHint, ...],
-        is_news: Callable[[object], bool],
+        is_new_picture: Callable[[object], bool],
         rejected: list[str],
     ) -> FeatureFrame | None:
         """Sound features of a new picture, or None; stores their plane.
@@ -114,7 +114,7 @@ class CameraInput:
             frame: The frame.
             velocity: Of the tip in B [m/s], (3,), or None.
             hints: Lines that are expected in the picture.
-            is_news: Whether a content differs from the last one.
+            is_new_picture: Whether a content differs from the last one.
             rejected: Gets what is refused.
         """
         if frame.image is None:
@@ -126,7 +126,7 @@ class CameraInput:
         features = check_features(features, self._most_lines, rejected)
         if frame.image is None:
             features = self._mount.features(features, rejected)
-        if not is_news(_content(frame, features)):
+        if not is_new_picture(_content(frame, features)):
             rejected.append("picture: repeats the last one")
             return None
         self.image_ns = features.stamp_ns

@@ -301,7 +301,7 @@ class Pilot:
         hints = ()
         if frame.image is not None:
             hints = self.camera.hints(frame.image.stamp_ns, self.painter.expected_edge(), self.contact.state)
-        return self.camera.perceive(frame, velocity, hints, self.supervision.is_news, rejected)
+        return self.camera.perceive(frame, velocity, hints, self.supervision.is_new_picture, rejected)
 
     def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> tuple[str, ...]:
         """Self-check with those raw sensors that the tick has; what it found."""

@@ -145,7 +145,7 @@ class Assured:
         newest = max([line.stamp_ns for line in checked.lines], default=0)
         if newest > max(self._lines_ns, 0):
             picture = tuple([(line.rho, line.theta) for line in checked.lines])
-            if supervision.is_news(picture):
+            if supervision.is_new_picture(picture):
                 self._lines_ns = newest
         attitude, rate, force = checked.attitude.tolist(), checked.angular_velocity.tolist(), checked.specific_force
         speed, down, faults = math.nan, down_in_body(attitude), dict[Fault, str]()

@@ -49,7 +49,7 @@ UNEXPLAINED = 0.5
 #: Residual of the fit by faulty rotors over that of the fit by a force through the centre of mass, at most [-]: wind
 #: has next to no moment. Equal losses of two opposite rotors fit a force as well; the missing lift finds them.
 LESS_THAN_WIND = 0.5
-#: Most rotors at once that are told apart.
+#: Most faulty rotors at once that are distinguished.
 MOST_ROTORS = 2
 #: A rotor that was found is followed down to this missing thrust [N] and this many standard deviations.
 FOUND, FOUND_SIGMAS = 1.5, 3.0

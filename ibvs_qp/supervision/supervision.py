@@ -104,7 +104,7 @@ class Supervision:
 
     # ------------------------------------------------------------------ inputs
 
-    def is_news(self, picture: object) -> bool:
+    def is_new_picture(self, picture: object) -> bool:
         """Whether a picture differs from the last one, if the camera has noise; one that repeats shows nothing."""
         return self._samples.add_picture(picture) or not self.settings.supervise
 

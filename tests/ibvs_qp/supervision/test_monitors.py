@@ -29,7 +29,7 @@ def first_found(
         values = change(number) if changed else {}
         picture = values.pop("picture", number)
         if picture is not None:
-            supervision.is_news(picture)
+            supervision.is_new_picture(picture)
         tick = quiet_tick(number, **values)
         supervision.watch(tick, response if changed and response else quiet)
         for fault in tick.faults:
@@ -167,7 +167,7 @@ def test_far_from_the_wall_wind_is_no_push() -> None:
 def test_a_simulator_without_noise_may_repeat_its_values() -> None:
     supervision = Supervision(CONFIG, SafetySettings())
     for number in range(1000):
-        assert supervision.is_news(0)
+        assert supervision.is_new_picture(0)
         tick = quiet_tick(number, inertial=0, wrench=0)
         supervision.watch(tick, StubResponse())
         assert not tick.faults

@@ -121,8 +121,8 @@ def test_a_rotor_that_does_not_follow_is_a_fault_with_limits() -> None:
 def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
     supervision, off = Supervision(CONFIG, SETTINGS), Supervision(CONFIG, SafetySettings(supervise=False))
     for each in (supervision, off):
-        assert all(each.is_news(number) for number in range(20))
-    assert not supervision.is_news(19) and supervision.is_news(20) and off.is_news(19)
+        assert all(each.is_new_picture(number) for number in range(20))
+    assert not supervision.is_new_picture(19) and supervision.is_new_picture(20) and off.is_new_picture(19)
 
 
 def test_the_command_tells_state_and_reasons() -> None:
