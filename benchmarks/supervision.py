@@ -13,10 +13,10 @@ import statistics
 import time
 from typing import Any
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.command import SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.supervision.assured import Assured
 from ibvs_qp.validation.measurement import MeasurementGate
 from sim.experiments.scenes import near_wall
 from sim.flight.options import FlightOptions, pilot_config

@@ -2,7 +2,6 @@ from allocation import TAROT_T960 as TAROT_T960
 from allocation import RotorGeometry as RotorGeometry
 from allocation import control_effectiveness as control_effectiveness
 from ibvs_qp.analytic import PaperController as PaperController
-from ibvs_qp.assured import Assured as Assured
 from ibvs_qp.command import ActiveLimit as ActiveLimit
 from ibvs_qp.command import Command as Command
 from ibvs_qp.command import Outcome as Outcome
@@ -28,5 +27,6 @@ from ibvs_qp.pilot import FlightStatus as FlightStatus
 from ibvs_qp.pilot import Pilot as Pilot
 from ibvs_qp.pilot import PilotConfig as PilotConfig
 from ibvs_qp.presets import preset as preset
+from ibvs_qp.supervision.assured import Assured as Assured
 
 __version__: str

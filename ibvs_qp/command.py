@@ -23,7 +23,7 @@ class Outcome(StrEnum):
 
 
 class SafetyState(StrEnum):
-    """State of the supervisor (`ibvs_qp.safety`), in the order of severity."""
+    """State of the supervisor (`ibvs_qp.supervision`), in the order of severity."""
 
     NOMINAL = "nominal"
     DEGRADED = "degraded"

@@ -112,6 +112,7 @@ class HybridController(CheckedLaw):
         ConfigError: When a row is not affine in the thrusts, two rows share a name, or the configuration is refused.
     """
 
+    CONSTANTS = ("problem",)
     problem_kind: ClassVar[type[QpProblem]] = QpProblem
     engine_kind: ClassVar[type[QpEngine]] = QpEngine
 

@@ -15,9 +15,9 @@ ROOT = Path(__file__).parents[1]
 #: Folders in the order of their imports: each imports only from earlier ones (docs/development.md).
 ORDER = {
     "ibvs_qp": (
-        "lazy quaternion frames measurement command axes config analysis adapters symbolic validation estimation "
-        "safety model tasks limits qp vision painting checked_law analytic controller export assured pilot presets "
-        "recording ros bridge"
+        "lazy quaternion frames measurement command axes config flight_state analysis adapters symbolic validation "
+        "estimation model tasks limits qp vision painting checked_law analytic controller export supervision pilot "
+        "presets recording ros bridge"
     ).split(),
     "sim": (
         "storage world scenes vehicles sensors rivals faults flight video evaluate scene_fuzz figures sweep report "

@@ -90,7 +90,7 @@ class Bridge:
             state=self.gate.state,
             reason=self.gate.reason,
             phase=flight.phase if flight else "",
-            safety=" ".join((flight.safety, *self.pilot.assurance.supervisor.reasons)) if flight else "",
+            safety=" ".join((flight.safety, *self.pilot.supervision.supervisor.reasons)) if flight else "",
             commands=self._commands,
             ignored=dict(self.inputs.held.ignored),
         )

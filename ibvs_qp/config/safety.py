@@ -1,4 +1,4 @@
-"""Settings of the supervisor and its monitors (`ibvs_qp.safety`, docs/safety.md)."""
+"""Settings of the supervisor and its monitors (`ibvs_qp.supervision`, docs/safety.md)."""
 
 from __future__ import annotations
 

@@ -170,7 +170,7 @@ class WallDistance:
         """Whether a measured normal agrees with the one predicted by the gyro, or has disagreed for long.
 
         A false gyro sample leaves the prediction wrong, so a normal is taken after all, but not again and again: a
-        mirrored one would turn the vehicle away. One that never agrees is a wall that is lost (`ibvs_qp.safety`).
+        mirrored one would turn the vehicle away. One that never agrees is a wall that is lost (`ibvs_qp.supervision`).
 
         Returns:
             The answer, and the normal expected at the capture: the measured one where that was taken after all.

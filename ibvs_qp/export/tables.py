@@ -15,11 +15,11 @@ from ibvs_qp.config import Gains
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.measurement import Reference
+from ibvs_qp.model.hover import hover_gains
 from ibvs_qp.model.setpoints import ANY_STEP
 from ibvs_qp.model.tick import LINE
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.qp.program_code import real, reals, table
-from ibvs_qp.safety.hover import hover_gains
 from ibvs_qp.symbolic.signals import places
 from ibvs_qp.validation import clock, geometry
 from ibvs_qp.validation.fields import REFERENCE, UNIT_TOLERANCE, FieldTable, measurement_table

@@ -26,6 +26,8 @@ _PRESENT, _VERTICAL, _CHANGED = LINE.index("present"), LINE.index("vertical"), L
 class StepInputs:
     """Packs the inputs that `ibvs_qp.model.tick` declares; entry by entry that costs four times as much."""
 
+    STATE = ("_paired", "_plane", "_plane_age", "_lines")
+
     def __init__(self, step: TickFunction, lines: int) -> None:
         self._pairing = LinePairing(lines)
         self._lines = [[0.0] * len(LINE) for _ in range(lines)]

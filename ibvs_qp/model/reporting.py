@@ -11,8 +11,8 @@ import numpy as np
 from ibvs_qp.command import ActiveLimit, Command, Outcome
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.hover import hold_thrusts
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.safety.hover import hold_thrusts
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9

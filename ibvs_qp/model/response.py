@@ -1,4 +1,4 @@
-"""Response of the vehicle against that of the model: signals of the monitors of rotors and push (`ibvs_qp.safety`)."""
+"""Response of the vehicle against that of the model: signals of the monitors of rotors and push."""
 
 from __future__ import annotations
 

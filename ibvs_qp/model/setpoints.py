@@ -23,6 +23,7 @@ from ibvs_qp.estimation.contact import no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.model.hover import hold_thrusts
 from ibvs_qp.model.inputs import LINE_OUTPUTS, RUN_TIME, setting_values
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.model import Model
@@ -30,7 +31,6 @@ from ibvs_qp.model.packing import KEPT, StepInputs
 from ibvs_qp.model.reach import UNBOUNDED
 from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.model.tick import TickFunction
-from ibvs_qp.safety.hover import hold_thrusts
 
 #: Thrust step without a rate limit, before the first command [N].
 ANY_STEP = 1e6
@@ -76,6 +76,8 @@ class Setpoints:
         free: Fraction of the directions right and down that no line fixes, (2,).
         last: Last commanded thrusts [N], (n,), None before the first.
     """
+
+    STATE = ("config", "_contact", "_stamp", "last", "_change", "_given_up")
 
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         config = self.config = model.config

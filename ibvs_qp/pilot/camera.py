@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
+from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.turned_camera import TurnedCamera
-from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
-from ibvs_qp.pilot.attitude_history import AttitudeHistory
+from ibvs_qp.estimation.wall_lines import WallAxes, image_line
+from ibvs_qp.frames import down_in_body
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, RgbdFrame, SensorFrame
+from ibvs_qp.painting.command import ExpectedEdge
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.contact_picture import hint_span
+from ibvs_qp.pilot.estimation import AttitudeHistory, Plane
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features
@@ -38,6 +44,8 @@ class CameraInput:
         seen_as: Applied to the features of every picture, for studies of perception errors.
     """
 
+    STATE = ("perception_result", "picture", "_capture_ns", "plane", "plane_ns", "image_ns", "plane_doubt")
+
     def __init__(
         self,
         config: PilotConfig,
@@ -50,7 +58,11 @@ class CameraInput:
         self._mount = TurnedCamera(config.controller.vehicle.camera_turn_deg)
         self._pictures = PictureGate()
         self._camera = RgbdCamera(config.camera, self._mount.rotation, self._pictures.problem)
-        place = np.array(config.controller.vehicle.camera_position_m)
+        vehicle, brush = config.controller.vehicle, config.vision.brush_width_m
+        place = np.array(vehicle.camera_position_m)
+        self._tip_from_camera = (np.array(vehicle.tip_position_m) - place).tolist()
+        ways = [(role, ahead) for role in (HORIZONTAL, VERTICAL) for ahead in (-1, 1)]
+        self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
         self._shutter = RollingShutter(config.camera.readout_s, self._camera.lens, place)
 
     def prepare(self, picture: RgbdFrame | None = None) -> None:
@@ -62,22 +74,38 @@ class CameraInput:
         if self._loader.problem:
             raise RuntimeError(self._loader.problem)
 
+    def load_perception(self) -> None:
+        """Load perception unless it is loaded."""
+        if self._loader.perception is None:
+            self.prepare()
+
     def reset(self) -> None:
         """As before the first picture; perception stays loaded."""
-        if self._loader.perception is not None:
-            self._loader.perception.reset()
+        self._loader.reset()
         self._pictures.reset()
         self.perception_result, self.picture, self._capture_ns = None, None, -1
-        self.plane: tuple[float, float, float, float] | None = None
+        self.plane: Plane | None = None
         self.plane_ns = self.image_ns = -1
         self.plane_doubt = ""
+
+    def hints(self, stamp_ns: int, expected: ExpectedEdge | None, contact: ContactState) -> tuple[LineHint, ...]:
+        """Place of the expected painted edge beside the brush in a picture, by the contact of the tick before."""
+        if expected is None or not contact.known:
+            return ()
+        axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
+        angle = 0.5 * math.pi if expected.role == HORIZONTAL else 0.0
+        rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
+        span = self._hint_spans[expected.role, expected.ahead]
+        if span[0] >= span[1]:
+            return ()
+        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
 
     def perceive(
         self,
         frame: SensorFrame,
         velocity: np.ndarray | None,
         hints: tuple[LineHint, ...],
-        is_news: Callable[[object], bool],
+        is_new_picture: Callable[[object], bool],
         rejected: list[str],
     ) -> FeatureFrame | None:
         """Sound features of a new picture, or None; stores their plane.
@@ -86,7 +114,7 @@ class CameraInput:
             frame: The frame.
             velocity: Of the tip in B [m/s], (3,), or None.
             hints: Lines that are expected in the picture.
-            is_news: Whether a content differs from the last one.
+            is_new_picture: Whether a content differs from the last one.
             rejected: Gets what is refused.
         """
         if frame.image is None:
@@ -98,7 +126,7 @@ class CameraInput:
         features = check_features(features, self._most_lines, rejected)
         if frame.image is None:
             features = self._mount.features(features, rejected)
-        if not is_news(_content(frame, features)):
+        if not is_new_picture(_content(frame, features)):
             rejected.append("picture: repeats the last one")
             return None
         self.image_ns = features.stamp_ns

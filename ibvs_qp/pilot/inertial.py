@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -12,23 +11,11 @@ from ibvs_qp.estimation.attitude_steps import AttitudeSteps
 from ibvs_qp.estimation.inertial_fallback import InertialFallback
 from ibvs_qp.frames import Vector3
 from ibvs_qp.measurement import FeatureFrame, SensorFrame
+from ibvs_qp.model.setpoints import Setpoints
+from ibvs_qp.validation.fields import SENSOR_FRAME
 
 #: Inertial sensors of a frame.
 INERTIAL = ("attitude", "angular_velocity", "specific_force")
-
-
-class MotorsModel(Protocol):
-    """What the motors' model of the controller's last step says."""
-
-    @property
-    def angular_acceleration(self) -> list[float]:
-        """Angular acceleration [rad/s^2], (3,)."""
-        ...
-
-    @property
-    def modelled_force(self) -> list[float]:
-        """Specific force [m/s^2], (3,)."""
-        ...
 
 
 class InertialData:
@@ -46,12 +33,13 @@ class InertialData:
 
     def __init__(self, tip_from_camera: Sequence[float], tick_s: float) -> None:
         self._steps, self._fallback = AttitudeSteps(), InertialFallback(tip_from_camera, tick_s)
+        self.reset()
 
-    def reset(self, measured: Mapping[str, list[float]]) -> None:
-        """As before the first tick, with the values assumed until then."""
+    def reset(self) -> None:
+        """As before the first tick."""
         self._steps.reset()
         self._fallback.reset()
-        self.attitude, self.rate, self.force = (measured[name] for name in INERTIAL)
+        self.attitude, self.rate, self.force = (SENSOR_FRAME.fallbacks[name] for name in INERTIAL)
 
     @property
     def lost(self) -> bool:
@@ -74,28 +62,21 @@ class InertialData:
         missing: Collection[str],
         dt: float,
         *,
-        motors: MotorsModel,
+        setpoints: Setpoints,
         normal: Vector3,
         angles: Mapping[int, float],
     ) -> SensorFrame:
-        """The frame of a tick with estimates in place of the sensors that fail.
+        """The frame with estimates in place of the ``missing`` sensors, by the motors' model of the last set-points.
 
-        Args:
-            frame: The frame.
-            measured: The last accepted values.
-            missing: Names of the sensors that fail.
-            dt: Time since the last tick [s].
-            motors: What the motors' model says.
-            normal: Unit vector into the wall, in B, (3,).
-            angles: Angle of every tracked line on the wall [rad], by identity.
+        ``normal`` is the wall's in B, (3,), and ``angles`` are those of the tracked lines on it [rad], by identity.
         """
         fallback = self._fallback
         if not fallback.active:
             fallback.begin(self.attitude, self.rate, normal, angles)
         attitude, rate, force = (None if name in missing else measured[name] for name in INERTIAL)
-        fallback.step(frame.stamp_ns, dt, motors.angular_acceleration, attitude, rate)
+        fallback.step(frame.stamp_ns, dt, setpoints.angular_acceleration, attitude, rate)
         self.attitude, self.rate = attitude or fallback.attitude, rate or fallback.rate
-        self.force = force or motors.modelled_force
+        self.force = force or setpoints.modelled_force
         values = (self.attitude, self.rate, self.force)
         return dataclasses.replace(frame, **dict(zip(INERTIAL, map(np.array, values), strict=True)))
 

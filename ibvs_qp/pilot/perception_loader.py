@@ -30,11 +30,18 @@ class PerceptionLoader:
         problem: Why there is none, "" while nothing loads.
     """
 
+    STATE = ()
+
     def __init__(self, config: PilotConfig) -> None:
         self._config = config
         self.perception: Perception | PaperPerception | None = None
         self.problem = ""
         self._thread: threading.Thread | None = None
+
+    def reset(self) -> None:
+        """As before the first picture; what is loaded stays."""
+        if self.perception is not None:
+            self.perception.reset()
 
     def start(self, picture: RgbdFrame | None = None) -> threading.Thread:
         """Begin to load, unless it does already; `prepare` of the pilot describes the picture."""

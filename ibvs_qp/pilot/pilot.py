@@ -1,62 +1,44 @@
-"""The pilot.
-
-One tick, in the order of `Pilot._fly`: validation, tare of the wrench, perception, contact, motion in the wall plane,
-strategy, reference, controller.
-"""
+"""The pilot: raw sensor frames in, commands out; the stages of a tick stand in their order in `Pilot._fly`."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import time
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ibvs_qp.analytic import PaperController
+from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.plane_acceleration import PlaneAcceleration
 from ibvs_qp.estimation.turned_camera import straightened
-from ibvs_qp.estimation.wall_lines import WallAxes, image_line
-from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
-from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
-from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
-from ibvs_qp.model.reporting import fixed_command
+from ibvs_qp.flight_state import FlightState, put_state, take_state
+from ibvs_qp.frames import down_in_body
+from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.painting.command import PainterInput, PaintingCommand, image_reference
-from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.strategy import Strategy, require_strategy
-from ibvs_qp.pilot.attitude_history import AttitudeHistory
+from ibvs_qp.painting.strategy import Strategy
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
-from ibvs_qp.pilot.contact_picture import hint_span
-from ibvs_qp.pilot.inertial import INERTIAL, InertialData
+from ibvs_qp.pilot.estimation import Estimation
+from ibvs_qp.pilot.inertial import INERTIAL
+from ibvs_qp.pilot.planning import FLYING, Planning
 from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
-from ibvs_qp.safety.assurance import Assurance
-from ibvs_qp.safety.policy import Fault
-from ibvs_qp.safety.rotor_loss import RotorLoss
-from ibvs_qp.safety.tick import Tick
+from ibvs_qp.supervision.faults import Fault
+from ibvs_qp.supervision.monitors import Tick
+from ibvs_qp.supervision.supervision import Limits, Supervision
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.measurement import answered_stamp
-from ibvs_qp.validation.self_check import SelfCheck
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
-from ibvs_qp.vision.lines.line_state import LineHint
 from ibvs_qp.vision.perception_result import PerceptionResult
-
-#: States in which the strategy flies.
-_FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
-#: Tip to wall before the first plane [m].
-ASSUMED_DISTANCE = 0.5
 
 
 class Controller(Protocol):
@@ -90,6 +72,14 @@ class Pilot:
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
     Attributes:
+        camera: Perception input: pictures or features of the flight.
+        estimation: Filters, and the measurement of a tick; of them `contact`, `motion` (along the wall) and `tare`.
+        planning: Strategy and reference.
+        supervision: Monitors, state machine and reactions; of it `self_check` (of the sensors' axes).
+        controller: The law.
+        push_report: Push asked, commanded and felt.
+        measurement, reference: Inputs of the law in the last tick; None before the first.
+        controller_time_s: Duration of the law in the last tick [s].
         observer: Called after every call of the law, for recordings; None disables it. It must not raise.
 
     Args:
@@ -99,6 +89,8 @@ class Pilot:
         controller: Control law, for studies of other laws; None builds the configured one.
     """
 
+    CONSTANTS = ("observer", "_commanded")
+
     def __init__(
         self,
         config: PilotConfig | None = None,
@@ -106,34 +98,17 @@ class Pilot:
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
         controller: Controller | None = None,
     ) -> None:
-        self.config = config or PilotConfig()
-        settings, vehicle = self.config.controller, self.config.controller.vehicle
-        self._tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
-        self._tip_camera = to_camera(self._tip, camera).tolist()
-        self._tip_from_camera = (self._tip - camera).tolist()
-        brush = self.config.vision.brush_width_m
-        ways = [(role, ahead) for role in (HORIZONTAL, VERTICAL) for ahead in (-1, 1)]
-        self._hint_spans = {way: hint_span(vehicle, brush, *way) for way in ways}
-        self._gate = SensorGate(self.config.camera.latest_s)
-        self._limits = ThrustLimits(vehicle.geometry.count)
-        self.self_check = SelfCheck(self.config.safety.self_check, LoadCheck(vehicle, self.config.safety))
-        self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
-        turn = vehicle.force_torque_turn_deg
-        self._force_axes = rotation_from_vector(np.radians(turn)) if any(turn) else None
-        self.tare = WrenchTare(vehicle, self.config.estimation)
-        self.contact = ContactEstimator(settings)
-        self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self._plane_acceleration = PlaneAcceleration(
-            self.config.estimation, settings.brush.force_delay_s, settings.compiled
-        )
-        self._history = AttitudeHistory(self.motion.ticks)
-        self._camera = CameraInput(self.config, self._history, seen_as)
-        self.rotor_loss = RotorLoss(vehicle, settings.gains)
-        self.assurance = Assurance(vehicle, self.config.safety)
-        self.push_report = PushReport()
-        self.painter: Strategy = require_strategy(Painter(self.config.painting) if painter is None else painter)
+        self.config = config = config or PilotConfig()
+        settings, vehicle = config.controller, config.controller.vehicle
+        self._gate, self._limits = SensorGate(config.camera.latest_s), ThrustLimits(vehicle.geometry.count)
+        self.estimation = estimation = Estimation(config)
+        self.contact, self.motion, self.tare = estimation.contact, estimation.motion, estimation.tare
+        self.camera = CameraInput(config, estimation.history, seen_as)
+        self.planning = Planning(config, painter)
+        self.supervision = Supervision(settings, config.safety, LoadCheck(vehicle, config.safety))
+        self.self_check, self.push_report = self.supervision.self_check, PushReport()
         self.observer: Callable[[LawCall], None] | None = None
-        law = HybridController if self.config.law == "qp" else PaperController
+        law = HybridController if config.law == "qp" else PaperController
         self.controller: Controller = controller or law(straightened(settings))
         self.reset()
 
@@ -148,37 +123,41 @@ class Pilot:
         Raises:
             RuntimeError: When perception cannot be loaded.
         """
-        self._camera.prepare(picture)
+        self.camera.prepare(picture)
 
     def reset(self) -> None:
         """As after construction."""
-        self._gate.reset()
-        self._inertial.reset(self._gate.last)
-        sensing = (self.self_check, self.tare, self._history, self._camera)
-        flying = (
-            self.contact,
-            self.motion,
-            self._plane_acceleration,
-            self.rotor_loss,
-            self.assurance,
-            self.painter,
-            self.controller,
-        )
-        for part in (*sensing, *flying, self.push_report):
+        stages = (self.estimation, self.camera, self.planning, self.supervision, self.controller)
+        for part in (self._gate, self._limits, *stages, self.push_report):
             part.reset()
-        self._first = self._stamp = self._imu_stamp = -1
-        self._covariance = self.motion.velocity_variance * np.eye(3)
-        self.thrust_limits = None
+        self._first_ns = self._stamp_ns = -1
         self._leaps = 0
-        self._rejected: list[str] = []  # inputs of the tick that were refused before the controller
         self._commanded: Command | None = None  # of the tick, once there is one
         self.measurement: Measurement | None = None
         self.reference = Reference()
-        self.painting_command: PaintingCommand | None = None
         self.controller_time_s = 0.0
 
+    def state(self) -> FlightState:
+        """Everything that changes from tick to tick; `restore` of this or an equal pilot continues from it.
+
+        The solver sets up anew after it, here as in every copy: later thrusts may differ in their last bits from those
+        without a snapshot, but not from copy to copy. A strategy's state is all of its attributes but functions.
+        """
+        return take_state(self, self.config)
+
+    def restore(self, state: FlightState) -> None:
+        """Continue from a state, bit-identical to the pilot that it is of; loads perception if that had it loaded.
+
+        Raises:
+            ConfigError: When it is of another class, configuration, strategy or law.
+            RuntimeError: When perception cannot be loaded.
+        """
+        if isinstance(state, FlightState) and "camera._loader.perception" in state.values:
+            self.camera.load_perception()
+        put_state(self, self.config, state)
+
     @property
-    def thrust_limits(self) -> tuple[np.ndarray, np.ndarray] | None:
+    def thrust_limits(self) -> Limits | None:
         """Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured ones.
 
         What is assigned is checked and copied; a refused value is named in the commands and leaves the last in force.
@@ -192,7 +171,7 @@ class Pilot:
     @property
     def status(self) -> FlightStatus:
         """Where the flight stands after the last tick."""
-        painter, supervisor = self.painter, self.assurance.supervisor
+        painter, supervisor, report = self.painter, self.supervision.supervisor, self.push_report
         ended = supervisor.state is SafetyState.TERMINATED
         return FlightStatus(
             phase=painter.phase,
@@ -201,24 +180,33 @@ class Pilot:
             reason="; ".join(supervisor.reasons) if ended else painter.reason,
             safety=supervisor.state,
             events=tuple(Event(*entry) for entry in painter.log),
-            push_asked_n=self.push_report.asked_n,
-            push_commanded_n=self.push_report.commanded_n,
-            push_flown_n=self.push_report.felt_n,
-            push_reduction=self.push_report.reduction,
+            push_asked_n=report.asked_n,
+            push_commanded_n=report.commanded_n,
+            push_flown_n=report.felt_n,
+            push_reduction=report.reduction,
         )
+
+    @property
+    def painter(self) -> Strategy:
+        """The strategy."""
+        return self.planning.painter
+
+    @painter.setter
+    def painter(self, painter: Strategy) -> None:
+        self.planning.painter = painter
 
     @property
     def picture(self) -> RgbdFrame | None:
         """The last picture as perception got it: rectified, and as of a camera that looks along +x."""
-        return self._camera.picture
+        return self.camera.picture
 
     @property
     def perception_result(self) -> PerceptionResult | None:
         """What perception found in the last picture."""
-        return self._camera.perception_result
+        return self.camera.perception_result
 
     @property
-    def setpoints(self):
+    def setpoints(self) -> Setpoints:
         """The controller's set-points, for logs."""
         return self.controller.setpoints
 
@@ -232,152 +220,136 @@ class Pilot:
         Returns:
             The controller's command.
         """
-        self._rejected, self._commanded = [], None
+        rejected: list[str] = []  # inputs that were refused before the controller
+        self._commanded = None
         try:
             checked, refused = self._gate.check(frame)
-            self._rejected += [*refused, *self._limits.rejected]
-            command = self._hold(frame) if checked is None else self._gate.clock.answered(self._fly(checked))
+            rejected += [*refused, *self._limits.rejected]
+            command = self._hold(frame) if checked is None else self._gate.clock.answered(self._fly(checked, rejected))
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
-            self._rejected.append(raised("pilot", error))
+            rejected.append(raised("pilot", error))
             if (command := self._commanded) is None:
                 command = self._hold(frame)
             else:  # a second one would break the rate limit
                 command = dataclasses.replace(command, stamp_ns=answered_stamp(frame))
-        if self._rejected:
-            return dataclasses.replace(command, rejected=(*command.rejected, *self._rejected))
+        if rejected:
+            return dataclasses.replace(command, rejected=(*command.rejected, *rejected))
         return command
 
     def _hold(self, frame: Any) -> Command:
         """Command of a tick without a frame: the controller refuses a measurement of the same time, and holds."""
         stamp = answered_stamp(frame)
-        self.assurance.miss(self.config.controller.tick_s)
+        self.supervision.miss()
         command = self._command(stamp, None)
-        return self.assurance.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=()))
+        return self.supervision.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=()))
 
-    def _fly(self, frame: SensorFrame) -> Command:
+    def _fly(self, frame: SensorFrame, rejected: list[str]) -> Command:
         """The tick of a validated frame."""
-        stamp, tick_s = frame.stamp_ns, self.config.controller.tick_s
-        dt = tick_s if self._stamp < 0 else min((stamp - self._stamp) * 1e-9, LONGEST_TICK)
-        self._first, self._stamp = stamp if self._first < 0 else self._first, stamp
-        if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
-            self._leaps = self._gate.clock.leaps
-            self.contact.doubt()
-            self.motion.doubt()
-            self._plane_acceleration.reset()
-        frame = self._levelled(self._in_body(frame), dt)
-        attitude, rate, force = self._inertial.attitude, self._inertial.rate, self._inertial.force
-        down = down_in_body(attitude)
-        wrench, wrench_stamp = self._contact_wrench(frame, force)
-        # After a lost rotor the vehicle turns away from the wall: its pictures show something else, and the force
-        # sensor measures the tool that swings round.
-        if turned := self.rotor_loss.turns(self.contact.state.normal[0]):
-            wrench = np.zeros(6)
-            if frame.features is not None or frame.image is not None:
-                self._rejected.append("picture: the vehicle is turned from the wall")
-        features = None if turned else self._perceive(frame)
-        surface_offset = self.contact.surface_offset
-        contact = self.contact.update(
-            stamp_ns=stamp,
-            angular_velocity=rate,
-            specific_force=force,
-            down=down,
-            contact_wrench=wrench,
-            wrench_stamp_ns=wrench_stamp,
-            plane=self._camera.plane,
-            plane_stamp_ns=self._camera.plane_ns,
-            press=self.reference.contact,  # of the tick before: the strategy needs the contact of this one
+        estimation, planning, supervision, setpoints = self.estimation, self.planning, self.supervision, self.setpoints
+        stamp, dt = frame.stamp_ns, self._advance(frame.stamp_ns)
+        # perceive: after a lost rotor the vehicle turns away from the wall, its pictures show something else
+        turned = supervision.rotor_loss.turns(self.contact.state.normal[0])
+        features = self._perceive(frame, turned, rejected)
+        # estimate
+        frame = estimation.sense(frame, self._gate, Fault.IMU_FROZEN in supervision.faults, setpoints, dt)
+        sample = supervision.contact_wrench(estimation.tared_wrench(frame), stamp, turned, setpoints)
+        plane = self.camera.plane, self.camera.plane_ns
+        contact, found = estimation.update_contact(stamp, sample, *plane, self.reference.contact)
+        planning.note("wall", found)
+        rejected += self._check_axes(frame, contact, dt)
+        axes = estimation.update_motion(stamp, sample[0], features, setpoints, dt, rejected)
+        # plan
+        limits = supervision.limits(self.thrust_limits)
+        target = planning.plan(estimation, supervision, limits, setpoints.push_reference, dt, rejected)
+        self.reference = supervision.reference(planning.reference(target, contact))
+        # measure
+        turning = supervision.rotor_loss.lost
+        drifting = turning or supervision.state not in FLYING
+        self.measurement = estimation.measurement(
+            frame, sample, axes, target.guides, plane, limits, drifting=drifting, turning=turning
         )
-        if self.contact.surface_offset > surface_offset:
-            found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
-            self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
-        self._check_axes(frame, contact, dt)
-        axes = WallAxes.of(contact.normal, down)
-        plane = self._plane_acceleration
-        felt = (wrench[:3] / self.config.controller.vehicle.mass_kg).tolist()
-        use_model = contact.in_contact and self.motion.velocity_age_s < self.config.estimation.velocity_life_s
-        plane.update(dt, force, self.setpoints.motors_force, felt, contact.normal, use_model)
-        self.motion.predict(stamp, axes, plane.force, rate, dt, plane.density)
-        self._history.remember(attitude, rate, dt)
-        if features is not None:
-            self._correct_motion(features, contact)
-        target = self.painting_command = self._strategy(frame, contact, dt)
-        self.reference = self.assurance.supervised(self._refer(target, contact))
-        self.measurement = self._measure(frame, (wrench, wrench_stamp), axes, target, contact)
+        # law
         begin = time.perf_counter()
         command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
-        if event := self.push_report.update(self.reference, contact, self.setpoints, command, dt):
-            self.painter.log.append(((stamp - self._first) * 1e-9, *event))
-        self._commanded = self.assurance.explained(command)
-        self.assurance.watch(self._shown(frame, contact, command), self.setpoints)
+        if event := self.push_report.update(self.reference, contact, setpoints, command, dt):
+            planning.note(*event)
+        # supervise
+        self._commanded = supervision.explained(command)
+        supervision.watch(self._tick(frame, contact, command), setpoints)
         return self._commanded
 
-    def _in_body(self, frame: SensorFrame) -> SensorFrame:
-        """The frame with force and moment of the sensor in axes of B."""
-        if self._force_axes is None:
-            return frame
-        force, moment = self._force_axes @ frame.wrench[:3], self._force_axes @ frame.wrench[3:]
-        return dataclasses.replace(frame, wrench=np.concatenate((force, moment)))
+    def _advance(self, stamp_ns: int) -> float:
+        """Begin a tick; time since the last one [s]."""
+        dt = self.config.controller.tick_s
+        if self._stamp_ns >= 0:
+            dt = min((stamp_ns - self._stamp_ns) * 1e-9, LONGEST_TICK)
+        self._first_ns, self._stamp_ns = stamp_ns if self._first_ns < 0 else self._first_ns, stamp_ns
+        self.planning.time_s = (stamp_ns - self._first_ns) * 1e-9
+        if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
+            self._leaps = self._gate.clock.leaps
+            self.estimation.doubt()
+        return dt
 
-    def _levelled(self, frame: SensorFrame, dt: float) -> SensorFrame:
-        """The frame with the inertial data to fly by; those that fail are estimated."""
-        measured, inertial = self._gate.last, self._inertial
-        missing = {name for name in INERTIAL if name in self._gate.replaced} | self._stale(frame)
-        if Fault.IMU_FROZEN in self.assurance.faults:
-            missing = set(INERTIAL)
-        if not missing:
-            return inertial.measure(frame, measured, dt)
-        angles = {identity: line.angle for identity, line in self.motion.lines.items()}
-        normal = self.contact.state.normal
-        return inertial.estimate(frame, measured, missing, dt, motors=self.setpoints, normal=normal, angles=angles)
+    def _perceive(self, frame: SensorFrame, turned: bool, rejected: list[str]) -> FeatureFrame | None:
+        """Sound features of a new picture, or None."""
+        if turned:
+            if frame.features is not None or frame.image is not None:
+                rejected.append("picture: the vehicle is turned from the wall")
+            return None
+        velocity = self.measurement.velocity if self.measurement is not None else None
+        hints = ()
+        if frame.image is not None:
+            hints = self.camera.hints(frame.image.stamp_ns, self.painter.expected_edge(), self.contact.state)
+        return self.camera.perceive(frame, velocity, hints, self.supervision.is_new_picture, rejected)
 
-    def _stale(self, frame: SensorFrame) -> set[str]:
-        """Inertial sensors whose stamps are too old."""
-        oldest, stale = frame.stamp_ns - round(1e9 * self.config.safety.imu_age_s), set[str]()
-        if frame.attitude_stamp_ns is not None and frame.attitude_stamp_ns < oldest:
-            stale.add(INERTIAL[0])
-        if frame.imu_stamp_ns is not None and frame.imu_stamp_ns < oldest:
-            stale.update(INERTIAL[1:])
-        return stale
+    def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> tuple[str, ...]:
+        """Self-check with those raw sensors that the tick has; what it found."""
+        now, missing, check = self._gate.last, self._gate.replaced, self.self_check
+        inertial = force = None
+        if not any(name in missing for name in INERTIAL):
+            inertial = now["attitude"], now["angular_velocity"], now["specific_force"]
+        if "wrench" not in missing:
+            force, noted = frame.wrench[:3].tolist(), check.note
+            free = contact.known and contact.distance > self.config.estimation.tare_distance_m
+            check.load(frame.wrench, frame.wrench_stamp_ns, self.estimation.inertial.force, free, dt)
+            if check.note != noted:
+                self.planning.note("force sensor", check.note)
+        return self.supervision.check_axes(inertial, force, contact, dt)
 
     def _command(self, stamp_ns: int, contact: ContactState | None) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
-        setpoints = self.setpoints
-        fixed = self.assurance.thrusts(setpoints.last, setpoints.floor)
-        if fixed is not None:
-            command = fixed_command(setpoints, stamp_ns, fixed, ())
-        else:
-            command = self.controller.step(self.measurement, self.reference, contact)  # type: ignore[arg-type]
+        law, measurement, reference = self.controller, self.measurement, self.reference
+        step: Callable[..., Command] = law.step
+        if contact is not None and getattr(step, "__func__", None) is CheckedLaw.step:
+            step = functools.partial(step, trusted=True)  # its numbers were checked in the frame
+        command, fixed = self.supervision.command(
+            lambda: step(measurement, reference, contact), law.setpoints, stamp_ns
+        )
         if self.observer is not None:
-            self.observer(LawCall(self.measurement, self.reference, contact, fixed, command))
+            self.observer(LawCall(measurement, reference, contact, fixed, command))
         return command
 
-    def _shown(self, frame: SensorFrame, contact: ContactState, command: Command) -> Tick:
-        """The tick as the monitors see it."""
-        now, motion, faults = self._gate.last, self.motion, dict[Fault, str]()
+    def _tick(self, frame: SensorFrame, contact: ContactState, command: Command) -> Tick:
+        """Inputs of the monitors."""
+        now, motion, inertial, faults = self._gate.last, self.motion, self.estimation.inertial, dict[Fault, str]()
         if motion.refused_s > self.config.safety.refusal_s:
             faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
-        if self._inertial.lost:
+        if inertial.lost:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
-        if self.rotor_loss.lost:
-            faults[Fault.NO_HOVER] = ""
-        if found := self.self_check.faults():
-            faults[Fault.INPUTS] = "; ".join(found)
-        if not any(name in self._gate.replaced for name in INERTIAL):
-            stamps = frame.attitude_stamp_ns, frame.imu_stamp_ns
-            self._imu_stamp = min([frame.stamp_ns, *(stamp for stamp in stamps if stamp is not None)])
+        sampled = not any(name in self._gate.replaced for name in INERTIAL)
         right, down = motion.state[0:2]
         return Tick(
             stamp_ns=frame.stamp_ns,
-            imu_ns=self._imu_stamp,
+            imu_ns=self.supervision.imu_stamp(sampled, frame.stamp_ns, frame.attitude_stamp_ns, frame.imu_stamp_ns),
             wrench_ns=frame.wrench_stamp_ns,
             plane_ns=self.contact.plane_ns,
-            image_ns=self._camera.image_ns,
-            lines_ns=self.motion.lines_ns if self.reference.lines else -1,
+            image_ns=self.camera.image_ns,
+            lines_ns=motion.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
-            down=down_in_body(self._inertial.attitude),
-            rate=self._inertial.rate,
+            down=down_in_body(inertial.attitude),
+            rate=inertial.rate,
             speed=math.hypot(right, down, contact.speed),
             height=-motion.state[5],
             contact=contact,
@@ -386,147 +358,5 @@ class Pilot:
             outcome=command.outcome,
             faults=faults,
             has_camera=True,
-            plane_doubt=self._camera.plane_doubt,
-        )
-
-    def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:
-        """Contact wrench and its time: the tared one, or that of inertial data while the sensor is faulty."""
-        tared, inertial = self._tared_wrench(frame, specific_force), self.assurance.wrench(self.setpoints)
-        return (tared, frame.wrench_stamp_ns) if inertial is None else (inertial, frame.stamp_ns)
-
-    def _tared_wrench(self, frame: SensorFrame, specific_force: list[float]) -> np.ndarray:
-        """Contact wrench on the vehicle [N, N m], (6,); the bias is averaged while the tip is away from the wall.
-
-        Away by the contact of the tick before, because the contact of this tick needs the wrench.
-        """
-        last = self.contact.state
-        free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
-        return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
-
-    def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> None:
-        """Self-check with those raw sensors that the tick has; it names what it found in every command."""
-        now, missing, check = self._gate.last, self._gate.replaced, self.self_check
-        if not any(name in missing for name in INERTIAL):
-            check.inertial(now["attitude"], now["angular_velocity"], now["specific_force"], dt)
-        if "wrench" not in missing:
-            free = contact.known and contact.distance > self.config.estimation.tare_distance_m
-            noted = check.note
-            check.load(frame.wrench, frame.wrench_stamp_ns, self._inertial.force, free, dt)
-            if check.note != noted:
-                self.painter.log.append((1e-9 * (self._stamp - self._first), "force sensor", check.note))
-            check.contact(frame.wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
-        self._rejected += [f"self-check: {fault}" for fault in check.faults()]
-
-    # -------------------------------------------------------------- perception
-
-    def _perceive(self, frame: SensorFrame) -> FeatureFrame | None:
-        """Sound features of a new picture, or None."""
-        velocity = self.measurement.velocity if self.measurement is not None else None
-        hints = () if frame.image is None else self._hints(frame.image.stamp_ns)
-        return self._camera.perceive(frame, velocity, hints, self.assurance.is_news, self._rejected)
-
-    def _hints(self, stamp_ns: int) -> tuple[LineHint, ...]:
-        """Expected place of a painted edge beside the brush, by lines and contact of the tick before."""
-        expected, contact = self.painter.expected_edge(), self.contact.state
-        if expected is None or not contact.known:
-            return ()
-        axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
-        level = expected.role == HORIZONTAL
-        angle = 0.5 * math.pi if level else 0.0
-        rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
-        span = self._hint_spans[expected.role, expected.ahead]
-        if span[0] >= span[1]:
-            return ()
-        return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
-
-    # -------------------------------------------------------------- estimation
-
-    def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
-        """Correct motion and lines at the time of capture."""
-        if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
-            normal, distance = plane_in_body(self.contact.on_felt_surface(features.plane), self._tip_from_camera)
-        elif contact.known:
-            normal, distance = contact.normal, contact.distance
-        else:
-            if features.lines:
-                self._rejected.append("features.lines: not used before the first plane")
-            return
-        self._inertial.correct(features, distance)
-        gravity = down_in_body(self._history.attitude(features.stamp_ns))
-        self.motion.correct(features, WallAxes.of(normal, gravity), distance)
-        self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
-
-    # ------------------------------------------------- strategy and controller
-
-    def _strategy(self, frame: SensorFrame, contact: ContactState, dt: float) -> PaintingCommand:
-        """Command of the strategy, tilted after a lost rotor."""
-        motion = self.motion
-        inputs = PainterInput(
-            time_s=(frame.stamp_ns - self._first) * 1e-9,
-            lines=MappingProxyType(motion.lines),  # a strategy of the user's must not lose lines of the filter
-            odometer=motion.state[4:6],
-            velocity=motion.state[:2],
-            distance=contact.distance,
-            wall_known=contact.known,
-            in_contact=contact.in_contact,
-            time_since_touch=contact.time_since_touch,
-            push=contact.push,
-            push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the strategy
-            tared=self.tare.ready,
-        )
-        if self.rotor_loss.update(self.assurance.limits(self.thrust_limits)):
-            self.painter.abandon(inputs, "no level hover is left")
-        elif self.assurance.state not in _FLYING and not self.painter.descending:
-            self.painter.stop(inputs, "; ".join(self.assurance.supervisor.reasons))
-        target = self.painter.fly(inputs)
-        if self.painter.fault:
-            self._rejected.append(self.painter.fault)
-        attitude = self.rotor_loss.target(contact, self._inertial.attitude, motion.state[0], dt)
-        return dataclasses.replace(target, **attitude) if attitude else target
-
-    def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
-        """Reference of a command at the measured distance."""
-        tip_right, tip_below, tip_ahead = self._tip_camera
-        depth = tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        return image_reference(target, depth, tip_below, tip_right)
-
-    def _measure(
-        self,
-        frame: SensorFrame,
-        sample: tuple[np.ndarray, int],
-        axes: WallAxes,
-        target: PaintingCommand,
-        contact: ContactState,
-    ) -> Measurement:
-        """Measurement of the tick from sensors and estimates; no velocity if the last one is too old."""
-        velocity = covariance = None
-        inertial = self.rotor_loss.lost or self.assurance.state not in _FLYING
-        if inertial or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
-            (right, down, *_), rate = self.motion.state, -contact.speed if self.rotor_loss.lost else contact.rate
-            rows = zip(axes.right, axes.down, axes.normal, strict=True)
-            velocity = np.array([r * right + d * down - n * rate for r, d, n in rows])
-            covariance = self._covariance
-        bias_right, bias_down = self.motion.state[BIAS]
-        distance = contact.distance if contact.known else ASSUMED_DISTANCE
-        low, high = self.assurance.limits(self.thrust_limits) or (None, None)
-        wrench, wrench_stamp = sample
-        return Measurement(
-            stamp_ns=frame.stamp_ns,
-            attitude=frame.attitude,
-            angular_velocity=frame.angular_velocity,
-            specific_force=frame.specific_force,
-            contact_wrench=wrench,
-            wrench_stamp_ns=wrench_stamp,
-            lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
-            plane=self._camera.plane and self.contact.on_felt_surface(self._camera.plane),
-            plane_stamp_ns=self._camera.plane_ns,
-            velocity=velocity,
-            velocity_covariance=covariance,
-            acceleration_bias=np.array(
-                [bias_right * r + bias_down * d for r, d in zip(axes.right, axes.down, strict=True)]
-            ),
-            thrust_min=low,
-            thrust_max=high,
-            attitude_stamp_ns=frame.attitude_stamp_ns,
-            imu_stamp_ns=frame.imu_stamp_ns,
+            plane_doubt=self.camera.plane_doubt,
         )

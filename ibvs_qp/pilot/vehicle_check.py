@@ -38,16 +38,6 @@ class VehicleCheck:
     picture: ContactPicture | None
 
 
-def vehicle_problems(config: PilotConfig, push_n: float) -> list[str]:
-    """Why a vehicle cannot paint with a push, one line each; empty if it can.
-
-    Args:
-        config: Vehicle, camera, brush and margins.
-        push_n: Push of the job [N].
-    """
-    return list(check_vehicle(config, push_n).problems)
-
-
 def vehicle_actuation(vehicle: VehicleParams) -> Actuation:
     """What the rotors of a vehicle can do at its tip."""
     tip, weight = np.array(vehicle.tip_position_m), vehicle.mass_kg * GRAVITY
@@ -66,7 +56,7 @@ def rotor_problems(vehicle: VehicleParams, found: Actuation) -> list[str]:
 
 
 def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = None) -> VehicleCheck:
-    """Problems and warnings of a vehicle; arguments as for `vehicle_problems`.
+    """Problems and warnings of a vehicle.
 
     Args:
         config: Vehicle, camera, brush and margins.

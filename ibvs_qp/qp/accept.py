@@ -28,6 +28,8 @@ class QpEngine:
         conflict: Names of a smallest set of hard rows that contradict each other, after a solve without a solution.
     """
 
+    STATE = ("conflict", "_limited")
+
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
         compiled = compiled_solver(problem, settings, data) if settings.backend == "compiled" else None

@@ -37,7 +37,7 @@ class CompiledSolver:
 
     def __init__(self, code: ctypes.CDLL, data: ProgramData, rotors: int) -> None:
         self._code = code
-        self._code.ibvs_solve_values.restype = ctypes.c_bool
+        self._code.ibvs_solve_values.restype, self._code.ibvs_step_size.restype = ctypes.c_bool, ctypes.c_double
         values = data.p, data.q, data.a, data.lower, data.upper, data.unlimited
         variables, rows = len(data.q), len(data.lower)
         self._memory = np.zeros(-(-self._code.ibvs_program_size() // 8))
@@ -49,18 +49,34 @@ class CompiledSolver:
         self._data = data  # owns the arrays at these addresses
         self._addresses = (ctypes.c_void_p * len(values))(*(array.ctypes.data for array in values))
         self._found = ctypes.c_void_p(self._solution.ctypes.data)
+        self.reset()
 
     def reset(self) -> None:
         """Drop the iterate and the adapted step size: the next solve is as after construction."""
         self._code.ibvs_program_reset(self._program)
+        self._start: np.ndarray | None = None  # x, y and step size from which the next solve sets up anew
+
+    def save_memory(self) -> np.ndarray | None:
+        """State of a flight, as of `OsqpSolver`."""
+        if step_size := self._code.ibvs_step_size(self._program):
+            self._code.ibvs_program_reset(self._program)
+            self._start = np.concatenate((self._x, self._y, (step_size,)))
+        return self._start
+
+    def load_memory(self, start: np.ndarray | None) -> None:
+        """Continue from a state."""
+        self.reset()
+        self._start = start
 
     def solve(self) -> tuple[AcceptedSolution | None, Tried | None]:
         """Solve the program of this tick; None if OSQP's answer fails the acceptance test, or the data is none."""
         start = time.perf_counter()
-        solved = self._code.ibvs_solve_values(self._program, self._addresses, self._found)
+        begin = None if self._start is None else ctypes.c_void_p(self._start.ctypes.data)
+        solved = self._code.ibvs_solve_values(self._program, self._addresses, begin, self._found)
         seconds = time.perf_counter() - start
         outcome, iterations, limited, _ = self._facts.tolist()
         tried = Tried(iterations, seconds) if iterations >= 0 else None
+        self._start = self._start if tried is None else None
         if not solved or outcome >= len(OUTCOMES):
             return None, tried
         thrusts, x, y = self._thrusts.copy(), self._x.copy(), self._y.copy()
@@ -68,8 +84,9 @@ class CompiledSolver:
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
         """Replace the iterate."""
-        x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
-        self._code.ibvs_warm_start(self._program, ctypes.c_void_p(x.ctypes.data), ctypes.c_void_p(y.ctypes.data))
+        self._x[:], self._y[:] = x, y
+        x_address, y_address = (ctypes.c_void_p(array.ctypes.data) for array in (self._x, self._y))
+        self._code.ibvs_warm_start(self._program, x_address, y_address)
 
 
 def compiled_solver(problem: QpProblem, settings: SolverSettings, data: ProgramData) -> CompiledSolver | None:

@@ -120,7 +120,7 @@ class Solver(ABC):
             from its bounds, by the library's own test.
         dense: P and A in full, for libraries that take dense matrices.
         workspace: Of the library; None until the first solve after a reset.
-        start: Iterate x, y of `warm_start`.
+        start: What the next set-up starts from, such as the iterate x, y; None from nothing.
 
     Args:
         patterns: Sparsity of the program.
@@ -135,7 +135,7 @@ class Solver(ABC):
         rows, variables = patterns.a_pattern.toarray().shape
         self._lengths = (patterns.p_pattern.nnz, variables, patterns.a_pattern.nnz, rows, rows)
         self.workspace: Any = None
-        self.start: tuple[np.ndarray, np.ndarray] | None = None
+        self.start: Any = None
 
     def solve(
         self,
@@ -183,6 +183,18 @@ class Solver(ABC):
     def reset(self) -> None:
         """Drop the iterate and all adapted parameters: the next solve is as after construction."""
         self.workspace = self.start = None
+
+    def save_memory(self) -> Any:
+        """State of a flight, from which the next solve sets up anew, here as in every copy.
+
+        Workspaces of libraries cannot be copied; a new set-up differs from the old one by rounding.
+        """
+        self.workspace = None
+        return self.start
+
+    def load_memory(self, start: Any) -> None:
+        """Continue from a state."""
+        self.workspace, self.start = None, start
 
     @property
     def gap_tolerance(self) -> float:

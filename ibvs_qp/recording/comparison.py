@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.command import ActiveLimit, Command
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.estimation.turned_camera import straightened
@@ -20,6 +19,7 @@ from ibvs_qp.recording.header import ASSURED, LAWS, PILOT, recorded_controller
 from ibvs_qp.recording.messages import encode
 from ibvs_qp.recording.reader import RecordedFlight, RecordedTick
 from ibvs_qp.recording.topics import RESET, STEP
+from ibvs_qp.supervision.assured import Assured
 
 #: Fields that are compared, and their units; durations differ from run to run, tasks follow from thrusts and inputs.
 NUMBERS = {

@@ -10,7 +10,6 @@ from importlib.metadata import version
 from typing import Any
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError
@@ -19,6 +18,7 @@ from ibvs_qp.config.settings import dump_toml, from_dict
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.pilot import Pilot, PilotConfig
+from ibvs_qp.supervision.assured import Assured
 
 #: Version of topics and messages that replay needs; another one is refused.
 FORMAT = "1"
@@ -41,7 +41,7 @@ def header(flown: Pilot | Assured | CheckedLaw) -> dict[str, str]:
         "law": shipped or f"{type(law).__module__}.{type(law).__qualname__}",
         "config": config,
         "config_sha256": digest(config),
-        "safety": dump_toml(flown.assurance.settings) if isinstance(flown, Assured) else "",
+        "safety": dump_toml(flown.supervision.settings) if isinstance(flown, Assured) else "",
         "rows": _rows(law),
         "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         "packages": ", ".join(f"{name} {version(name)}" for name in _PACKAGES),

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.assured import Assured
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement, Reference, RgbdFrame, SensorFrame
@@ -19,6 +18,7 @@ from ibvs_qp.recording import topics
 from ibvs_qp.recording.camera import CameraTopics
 from ibvs_qp.recording.header import header
 from ibvs_qp.recording.writer import PICTURE_ROOM, Log, LogWriter
+from ibvs_qp.supervision.assured import Assured
 
 _COPIED = (Command, FeatureFrame, LineFeature, Measurement, Reference, RgbdFrame, SensorFrame)
 _MUTABLE = re.compile(r"ndarray|tuple\[float|LineFeature|FeatureFrame|RgbdFrame")

@@ -69,7 +69,7 @@ class StepFunction:
     Attributes:
         inputs, states, outputs: Views by name; write inputs with ``[:] =``, outputs hold after `evaluate`.
         point: All inputs and states of the last evaluation in one column: together they reproduce the step.
-        memory: All numbers of the step; a copy of it restores an earlier step.
+        memory: All numbers of the step; a copy of it restores an earlier step. Their number is ``size``.
         results: All outputs in one column; starts: place of the first entry of each.
         extra: Arrays of the additional results, in their order.
 
@@ -103,12 +103,21 @@ class StepFunction:
         self.outputs = {name: self.results[place] for name, place in places(signals.outputs).items()}
         self.starts = {name: place.start for name, place in places(signals.outputs).items()}
         self._start = np.concatenate([*signals.starts.values(), np.zeros(0)])
+        self.size = self.memory.size
         self.reset()
 
     def reset(self) -> None:
         """Set the states to their start values."""
         self._state[:] = self._next[:] = self._start
         self._sum[0] = 0.0
+
+    def save_memory(self) -> np.ndarray:
+        """State of a flight: the memory that the function is bound to."""
+        return self.memory
+
+    def load_memory(self, values: np.ndarray) -> None:
+        """Continue from a state."""
+        self.memory[:] = values
 
     def advance(self) -> None:
         """Move on to the states that the last evaluation computed; they stay where one of them is not finite."""

@@ -82,6 +82,14 @@ class MonotonicClock:
         self.shift_ns = self.last_ns - stamp
         return ""
 
+    def follow(self, time: int) -> bool:
+        """Advance to a time of another such clock; False where that is no plain next step."""
+        step = time - self.last_ns
+        if self.shift_ns or self.last_ns < 0 or not 0 < step <= LEAP_NS:
+            return False
+        self.last_ns, self._odd_count = time, 0
+        return True
+
     def sample_time(self, stamp: Any) -> int | None:
         """Time of a sample of the tick accepted last; None for what is no stamp or too far ahead of the tick."""
         stamp = stamp_of(stamp)

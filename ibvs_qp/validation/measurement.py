@@ -12,7 +12,7 @@ import numpy as np
 from ibvs_qp.measurement import LineFeature, Measurement
 from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock, stamp_of
 from ibvs_qp.validation.fields import Entries, measurement_table, plain_instance
-from ibvs_qp.validation.geometry import read_line, read_lines, read_plane
+from ibvs_qp.validation.geometry import LINE_BOUND, read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
 #: Lines looked at for every line that the program has room for: roles and order select among them.
@@ -45,6 +45,8 @@ class MeasurementGate:
         clock: Maps the measurements' stamps to the controller's time.
         replaced: Names of the fields that the last measurement lacked.
     """
+
+    STATE = ("replaced", "_last", "_measured", "_wrench_stamp", "_stamps")
 
     def __init__(self, rotors: int, line_slots: int) -> None:
         self._table, self._most_lines = measurement_table(rotors), LINES_PER_SLOT * line_slots
@@ -95,6 +97,30 @@ class MeasurementGate:
             return None, tuple(rejected)
         self._last, self._measured, self.replaced = entries, True, tuple(refused)
         return (dataclasses.replace(measurement, **changes) if changes else measurement), tuple(rejected)
+
+    def trust(self, measurement: Measurement) -> bool:
+        """Accept a measurement whose caller has made and timed its numbers itself, as `Pilot`.
+
+        A second fence: bounds of the vectors, finite lines and plane, the order of time.
+
+        Returns:
+            False, and nothing accepted, where `check` might change anything.
+        """
+        entries, changes, _ = self._table.read(measurement, self._last, [])
+        lines, plane, low, high = measurement.lines, measurement.plane, entries["thrust_min"], entries["thrust_max"]
+        largest = sum([abs(line.rho) + line.covariance.trace() for line in lines])  # not finite if one entry is not
+        sound = not changes and largest <= LINE_BOUND and len(lines) <= self._most_lines
+        if not sound or (plane is not None and read_plane(plane) is not plane):
+            return False
+        if low is not None and high is not None and any(map(gt, low, high)):
+            return False
+        if not self._measured or not self.clock.follow(measurement.stamp_ns):
+            return False
+        self._last, self.replaced, self._wrench_stamp = entries, (), measurement.wrench_stamp_ns
+        for name in ("attitude_stamp_ns", "imu_stamp_ns"):
+            if (stamp := getattr(measurement, name)) is not None:
+                self._stamps[name] = stamp
+        return True
 
     def _check_times(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
         """Stamp of the tick, and the optional ones of the inertial sensors: None for at the tick."""

@@ -23,8 +23,21 @@ class ThrustLimits:
 
     def __init__(self, rotors: int) -> None:
         self._sides = [thrust_limit("thrust_min", rotors), thrust_limit("thrust_max", rotors)]
+        self.reset()
+
+    def reset(self) -> None:
+        """Without a report the configured limits are in force."""
         self.accepted: tuple[np.ndarray, np.ndarray] | None = None
         self.rejected: list[str] = []
+
+    def save_memory(self) -> tuple[tuple[np.ndarray, np.ndarray] | None, list[str]]:
+        """State of a flight."""
+        return self.accepted, self.rejected
+
+    def load_memory(self, values: tuple[tuple[np.ndarray, np.ndarray] | None, list[str]]) -> None:
+        """Continue from a state; copies are writeable, those in force are not."""
+        self.assign(values[0])
+        self.rejected = values[1]
 
     @np.errstate(all="ignore")  # a host may have numpy raise where a number has no float
     def assign(self, limits: Any) -> None:

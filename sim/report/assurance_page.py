@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from ibvs_qp.config import SafetySettings
-from ibvs_qp.safety.policy import POLICY, Rule
+from ibvs_qp.supervision.faults import POLICY, Rule
 from sim.evaluate.table import markdown
 
 #: Marks around the table.

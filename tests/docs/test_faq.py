@@ -9,7 +9,7 @@ import pytest
 
 import sim.commands.exit_codes as exit_codes
 import sim.report.refusals as refusals
-from ibvs_qp.safety.policy import Fault
+from ibvs_qp.supervision.faults import Fault
 
 PAGE = Path(__file__).parents[2] / "docs" / "faq.md"
 

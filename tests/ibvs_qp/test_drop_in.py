@@ -66,13 +66,13 @@ def loaded(code: str) -> set[str]:
 @pytest.mark.parametrize("config", ["from ibvs_qp import preset; config = preset().controller", "config = None"])
 def test_the_laws_and_assured_fly_in_a_light_installation(config: str) -> None:
     modules = loaded(LOAD_AND_FLY.replace("CONFIG", config).replace("TICKS", "50"))
-    assert {"osqp", "scipy.sparse", "ibvs_qp.safety.supervisor"} <= modules
+    assert {"osqp", "scipy.sparse", "ibvs_qp.supervision.supervisor"} <= modules
 
 
 def test_a_tick_of_the_laws_loads_no_heavy_part_of_scipy() -> None:
     code = LOAD_AND_FLY.replace("CONFIG", "config = None").replace(", Assured(HybridController(config))", "")
     code = code.replace("import Assured, ", "import ")
-    assert not loaded(code.replace("TICKS", "2")) & (HEAVY | {"qpsolvers", "ibvs_qp.assured"})
+    assert not loaded(code.replace("TICKS", "2")) & (HEAVY | {"qpsolvers", "ibvs_qp.supervision.assured"})
 
 
 def test_every_module_below_vision_loads_in_a_light_installation() -> None:
@@ -94,7 +94,7 @@ def test_importing_the_controller_loads_numpy_and_casadi_alone() -> None:
     assert not {name.split(".")[0] for name in modules} & {"scipy", "osqp", "qpsolvers", "jinja2", "tomli_w", "cv2"}
     # Of the own packages only the laws: no painting strategy or pilot, and of vision one matrix.
     parts = {name for name in modules if name.split(".")[0] == "ibvs_qp"}
-    assert not parts & {"ibvs_qp.painting.painter", "ibvs_qp.pilot", "ibvs_qp.safety.rotor_loss"}
+    assert not parts & {"ibvs_qp.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_loss"}
     assert not any(name.startswith("ibvs_qp.vision") for name in parts)
 
 

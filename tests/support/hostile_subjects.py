@@ -10,10 +10,10 @@ from __future__ import annotations
 from hostile_flight import Subject
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.assured import Assured
 from ibvs_qp.config import ControllerConfig, Gains, SafetySettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.supervision.assured import Assured
 from tests.replay.cases import CASES
 
 UNSUPERVISED = SafetySettings(supervise=False)

@@ -1,4 +1,4 @@
-"""Ticks and responses as monitors see them: a quiet contact at 5 N unless changed."""
+"""Inputs of the monitors: a quiet contact at 5 N unless changed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact import ContactEstimator
-from ibvs_qp.safety.tick import Tick
+from ibvs_qp.supervision.monitors import Tick
 
 TICK_NS = 4_000_000
 CONTACT = ContactEstimator(ControllerConfig()).state._replace(
@@ -20,7 +20,7 @@ CONTACT = ContactEstimator(ControllerConfig()).state._replace(
 
 @dataclass
 class StubResponse:
-    """A vehicle that follows its model."""
+    """Set-points of a vehicle that follows its model."""
 
     inertial_push: float = 5.0
     carried_weight: float = 0.0
@@ -28,6 +28,8 @@ class StubResponse:
     missing_noise: float = 0.1
     missing_thrust: np.ndarray = field(default_factory=lambda: np.zeros(6))
     motor_thrusts: np.ndarray = field(default_factory=lambda: np.full(6, 11.3))
+    floor: np.ndarray = field(default_factory=lambda: np.full(6, 1.2))
+    last: np.ndarray = field(default_factory=lambda: np.full(6, 11.0))
 
 
 def quiet_tick(number: int, **changes: Any) -> Tick:

@@ -38,13 +38,21 @@ typedef struct {
 /* The solution of the program's data; false where the data is no program, or no answer passes the acceptance test. */
 bool ibvs_solve(ibvs_program *program, ibvs_solution *solution);
 
-/* The same from arrays elsewhere, p, q, a, lower, upper, unlimited, for callers without this header. */
+/* The same with OSQP set up anew from an iterate and a step size: continues another instance's solves. */
+bool ibvs_solve_from(ibvs_program *program, const ibvs_real *x, const ibvs_real *multipliers, ibvs_real rho,
+                     ibvs_solution *solution);
+
+/* Step size of OSQP; 0 before the first solve. */
+ibvs_real ibvs_step_size(const ibvs_program *program);
+
+/* The same from arrays elsewhere, p, q, a, lower, upper, unlimited, for callers without this header; start: NULL, or x,
+ * multipliers and step size to begin anew from. */
 uint32_t ibvs_program_size(void);
-bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], ibvs_solution *solution);
+bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], const ibvs_real *start,
+                       ibvs_solution *solution);
 
 /* The exact solution by an active set, from multipliers near those of the solution; false where it is not found. */
 bool ibvs_active_set(const ibvs_program *program, ibvs_real multipliers[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES]);
-
 /* Drop the iterate and the adapted step size. */
 void ibvs_program_reset(ibvs_program *program);
 

@@ -295,9 +295,8 @@ void ibvs_warm_start(ibvs_program *program, const ibvs_real *x, const ibvs_real 
 
 void ibvs_program_reset(ibvs_program *program) { program->ready = program->limited = false; }
 
-bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
-  const ibvs_real no_multipliers[IBVS_ROWS] = {0};
-  solution->iterations = -1;
+/* The program's data into OSQP; false where it is no program. */
+static bool load(ibvs_program *program) {
   if (!good_data(program)) {
     return false;
   }
@@ -311,6 +310,12 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
     ibvs_program_reset(program);
     return false;
   }
+  return true;
+}
+
+static bool solve_loaded(ibvs_program *program, ibvs_solution *solution) {
+  const ibvs_real no_multipliers[IBVS_ROWS] = {0};
+  OSQPSolver *solver = &program->solver.solver;
   if (!program->limited && ibvs_finite(program->unlimited, IBVS_VARIABLES)) {
     (void)osqp_warm_start(solver, program->unlimited, no_multipliers);
   }
@@ -335,14 +340,40 @@ bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
   return true;
 }
 
+bool ibvs_solve(ibvs_program *program, ibvs_solution *solution) {
+  solution->iterations = -1;
+  return load(program) && solve_loaded(program, solution);
+}
+
+bool ibvs_solve_from(ibvs_program *program, const ibvs_real *x, const ibvs_real *multipliers, ibvs_real rho,
+                     ibvs_solution *solution) {
+  solution->iterations = -1;
+  ibvs_program_reset(program);
+  if (!load(program)) {
+    return false;
+  }
+  (void)osqp_update_rho(&program->solver.solver, rho);
+  ibvs_warm_start(program, x, multipliers);
+  return solve_loaded(program, solution);
+}
+
 uint32_t ibvs_program_size(void) { return (uint32_t)sizeof(ibvs_program); }
 
-bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], ibvs_solution *solution) {
+ibvs_real ibvs_step_size(const ibvs_program *program) {
+  return program->ready ? program->solver.solver.settings->rho : 0;
+}
+
+bool ibvs_solve_values(ibvs_program *program, const ibvs_real *const values[6], const ibvs_real *start,
+                       ibvs_solution *solution) {
   memcpy(program->p, values[0], sizeof program->p);
   memcpy(program->q, values[1], sizeof program->q);
   memcpy(program->a, values[2], sizeof program->a);
   memcpy(program->lower, values[3], sizeof program->lower);
   memcpy(program->upper, values[4], sizeof program->upper);
   memcpy(program->unlimited, values[5], sizeof program->unlimited);
+  if (start != NULL) {
+    const ibvs_real *multipliers = start + IBVS_VARIABLES;
+    return ibvs_solve_from(program, start, multipliers, multipliers[IBVS_ROWS], solution);
+  }
   return ibvs_solve(program, solution);
 }

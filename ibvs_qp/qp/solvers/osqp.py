@@ -34,6 +34,7 @@ class OsqpSolver(Solver):
     def __init__(self, patterns: ProgramPatterns, settings: SolverSettings) -> None:
         super().__init__(patterns, settings)
         self._no_multipliers = np.zeros(self._lengths[-1])
+        self._iterate = np.zeros(self._lengths[1]), self._no_multipliers
 
     def _setup(self, values: ProgramValues) -> osqp.OSQP:
         p, q, a, lower, upper = values
@@ -41,6 +42,8 @@ class OsqpSolver(Solver):
         p_matrix.data, a_matrix.data = p.copy(), a.copy()
         solver = osqp.OSQP()
         settings = {"verbose": False, "warm_starting": True} | osqp_settings(self.settings)
+        if self.start is not None:
+            settings["rho"] = self.start[2]
         solver.setup(p_matrix, q.copy(), a_matrix, lower.copy(), upper.copy(), **settings)
         # The wrapper copies twenty fields of information per solve: 30 % more time per step. The extension object is
         # private; where a release of OSQP has none, the public interface is used.
@@ -51,6 +54,9 @@ class OsqpSolver(Solver):
         p, q, a, lower, upper = values
         if self.workspace is None:
             self.workspace = self._setup(values)
+            if self.start is not None:
+                self.warm_start(*self.start[:2])
+                self.start = None
         elif self._inner is not None:
             if self._inner.update_data_vec(q, lower, upper) or self._inner.update_data_mat(p, None, a, None):
                 return None
@@ -67,17 +73,24 @@ class OsqpSolver(Solver):
             x, y = np.array(solution.x), np.array(solution.y)
         if info.status_val == INTERRUPTED:
             signal.raise_signal(signal.SIGINT)
+        self._iterate = x, y
         return Solution(x, y, OUTCOMES.get(int(info.status_val)), int(info.iter))
 
     def warm_start(self, x: np.ndarray, y: np.ndarray) -> None:
         """Replace the iterate, unless the next solve sets up anew."""
         if self.workspace is None:
             return
-        x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
+        self._iterate = x, y = np.ascontiguousarray(x, float), np.ascontiguousarray(y, float)
         if self._inner is not None:
             self._inner.warm_start(x, y)
         else:
             self.workspace.warm_start(x=x, y=y)
+
+    def save_memory(self) -> tuple[np.ndarray, np.ndarray, float] | None:
+        """State of a flight: iterate and step size, from which the next solve sets up anew, here as in every copy."""
+        if self.workspace is not None:
+            self.start = *self._iterate, self.workspace.settings.rho
+        return super().save_memory()
 
 
 def osqp_settings(settings: SolverSettings) -> dict[str, float]:

@@ -17,7 +17,7 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
-from ibvs_qp.safety.hover import hold_thrusts
+from ibvs_qp.model.hover import hold_thrusts
 
 PRODUCTS = (0.03, -0.05, 0.02)
 DIAGONAL, FULL = (

@@ -102,13 +102,13 @@ def test_noise_of_the_depth_picture_reaches_the_supervisor_as_the_cause(
 ) -> None:
     pilot, rng, doubts = new_pilot(), np.random.default_rng(0), []
     pilot.prepare()
-    watch = pilot.assurance.watch
+    watch = pilot.supervision.watch
 
     def watched(tick, response) -> None:
         doubts.append(tick.plane_doubt)
         watch(tick, response)
 
-    monkeypatch.setattr(pilot.assurance, "watch", watched)
+    monkeypatch.setattr(pilot.supervision, "watch", watched)
     for seen in pictures()[:20]:
         assert seen.image is not None
         depth = seen.image.depth * (1.0 + noise * rng.standard_normal(seen.image.depth.shape))

@@ -10,7 +10,7 @@ from ibvs_qp.config import ControllerConfig, VehicleParams
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.contact_picture import contact_picture, hint_span
-from ibvs_qp.pilot.vehicle_check import vehicle_problems
+from ibvs_qp.pilot.vehicle_check import check_vehicle
 
 #: 70 degrees upright.
 WIDE = VehicleParams(camera_intrinsics_px=(342.8, 342.8, 319.5, 239.5))
@@ -45,5 +45,5 @@ def test_columns_need_a_guide_beside_the_brush() -> None:
     far = VehicleParams(camera_position_m=(0.20, -0.22, 0.08))
     rows = PilotConfig(controller=ControllerConfig(vehicle=far))
     columns = dataclasses.replace(rows, painting=PaintingConfig(pattern="columns", start="top-right"))
-    assert "no guide position in view" in vehicle_problems(rows, 5.0)[0]
-    assert "column" in vehicle_problems(columns, 5.0)[0]
+    assert "no guide position in view" in check_vehicle(rows, 5.0).problems[0]
+    assert "column" in check_vehicle(columns, 5.0).problems[0]

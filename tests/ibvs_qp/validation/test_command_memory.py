@@ -12,11 +12,11 @@ from recorded_inputs import recording
 from references import good_reference
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.assured import Assured
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.supervision.assured import Assured
 
 LAWS = {
     "qp": HybridController,

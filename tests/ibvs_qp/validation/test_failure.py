@@ -11,10 +11,10 @@ from recorded_inputs import recording
 from references import good_reference
 
 from ibvs_qp.analytic import PaperController
-from ibvs_qp.assured import Assured
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, SensorFrame
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.supervision.assured import Assured
 from ibvs_qp.validation.failure import raised
 
 

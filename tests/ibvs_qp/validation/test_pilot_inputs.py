@@ -170,7 +170,7 @@ def test_an_estimator_that_raises_is_named_and_held(monkeypatch: pytest.MonkeyPa
 def test_a_monitor_that_fails_after_the_law_does_not_step_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     _, expected = flown_with({}, 60)
     pilot, commands = flown_with({}, 50)
-    monkeypatch.setattr(pilot.assurance, "watch", lambda *_: 1 / 0)
+    monkeypatch.setattr(pilot.supervision, "watch", lambda *_: 1 / 0)
     last = commands[-1]
     for tick in range(50, 60):
         last = pilot.step(frames()[tick])

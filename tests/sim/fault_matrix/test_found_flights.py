@@ -46,6 +46,6 @@ def test_nor_does_another_one_or_one_of_the_accelerometer(row, place, seed):
     assert not failures(row, place, "ideal", seed)
 
 
-@pytest.mark.slow  # the monitor alone: tests/ibvs_qp/safety/test_rotor_monitor.py
+@pytest.mark.slow  # the monitor alone: tests/ibvs_qp/supervision/test_rotor_monitor.py
 def test_weak_rotors_found_in_a_fast_manoeuvre_still_let_the_vehicle_down_slowly():
     assert not failures("all rotors limited to 25 %, unreported", "free", "datasheet", 4)

@@ -85,7 +85,7 @@ def test_a_board_before_the_seen_wall_is_pressed_softly() -> None:
     """Vision takes the wall for the board from the start: the tip meets the board before the estimated surface."""
     pilot, world = make_pilot(SCENE, OPTIONS, CONFIG, PaintJob()), World(SCENE, OPTIONS, CONFIG)
     largest = 0.0
-    while pilot.painter.phase != "paint" and pilot.assurance.state == "nominal":
+    while pilot.painter.phase != "paint" and pilot.supervision.state == "nominal":
         world.act(pilot.step(behind(world.sense())).thrusts)
         largest = max(largest, float(world.plant.truth[PLACES["pushes"]].max()))
     world.close()

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 from ibvs_qp.config import SafetySettings
-from ibvs_qp.safety.policy import POLICY, Fault
+from ibvs_qp.supervision.faults import POLICY, Fault
 from sim.report.assurance_page import policy_table, put_into
 
 PAGE = Path(__file__).parents[3] / "docs" / "safety.md"

@@ -10,7 +10,7 @@ import pytest
 from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.safety.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss
+from ibvs_qp.supervision.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss
 
 VEHICLE = VehicleParams()
 LOWER, UPPER = np.full(6, 1.2), np.full(6, 52.56)

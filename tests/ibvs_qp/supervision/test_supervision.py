@@ -9,53 +9,54 @@ import pytest
 from safety_ticks import CONTACT, StubResponse, quiet_tick
 
 from ibvs_qp.command import Command, Outcome, SafetyState
-from ibvs_qp.config import SafetySettings
-from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.measurement import Reference
-from ibvs_qp.safety.assurance import LEAST_STOP, Assurance
-from ibvs_qp.safety.policy import Fault
+from ibvs_qp.supervision.faults import Fault
+from ibvs_qp.supervision.supervision import LEAST_STOP, Supervision
 
-VEHICLE, SETTINGS = VehicleParams(), SafetySettings()
-FLOOR, LAST = np.full(6, 1.2), np.full(6, 11.0)
+CONFIG, SETTINGS = ControllerConfig(), SafetySettings()
+FLOOR, LAST = StubResponse().floor, StubResponse().last
+SAMPLE = np.full(6, 0.5), 7
 FREE = CONTACT._replace(in_contact=False, distance=0.2, push=0.0)
 MOVING = np.array([0.1, 0.0])
 PRESS = Reference(push_force=5.0, standoff=0.02, contact=True, velocity=MOVING, travel=MOVING)
 STOPPED = {"image_ns": 0, "plane_ns": 0}
 
 
-def watched(ticks: int, response: StubResponse | None = None, after: Assurance | None = None, **values: Any):
-    """The assurance after some equal ticks."""
-    assurance = after or Assurance(VEHICLE, SETTINGS)
-    begin = getattr(assurance, "ticks", 0)
+def watched(ticks: int, response: StubResponse | None = None, after: Supervision | None = None, **values: Any):
+    """The supervision after some equal ticks."""
+    supervision = after or Supervision(CONFIG, SETTINGS)
+    begin = getattr(supervision, "ticks", 0)
     for number in range(begin, begin + ticks):
-        assurance.watch(quiet_tick(number, **values), response or StubResponse())
-    assurance.ticks = begin + ticks  # type: ignore[attr-defined]
-    return assurance
+        supervision.watch(quiet_tick(number, **values), response or StubResponse())
+    supervision.ticks = begin + ticks  # type: ignore[attr-defined]
+    return supervision
 
 
 def test_while_nominal_everything_is_the_callers() -> None:
-    assurance = watched(100)
-    assert assurance.supervised(PRESS) is PRESS and assurance.thrusts(LAST, FLOOR) is None
-    assert assurance.wrench(StubResponse()) is None and assurance.limits(None) is None and assurance.faults == {}
+    supervision = watched(100)
+    assert supervision.reference(PRESS) is PRESS and supervision.thrusts(StubResponse()) is None
+    assert supervision.contact_wrench(SAMPLE, 9, False, StubResponse()) == SAMPLE
+    assert supervision.limits(None) is None and supervision.faults == {}
 
 
 @pytest.mark.parametrize("contact", [CONTACT, FREE])
 def test_a_degraded_vehicle_neither_travels_nor_begins_to_press(contact: Any) -> None:
     degraded = watched(80, contact=contact, **STOPPED)
     assert degraded.state is SafetyState.DEGRADED
-    reference = degraded.supervised(PRESS)
+    reference = degraded.reference(PRESS)
     assert not reference.velocity.any() and not reference.travel.any()
     assert reference.contact == contact.in_contact and reference.push_force == 5.0
     assert reference.standoff == max(contact.distance, LEAST_STOP)
     free = Reference(standoff=0.5, velocity=MOVING)
-    assert degraded.supervised(free).standoff == 0.5 and not degraded.supervised(free).contact
+    assert degraded.reference(free).standoff == 0.5 and not degraded.reference(free).contact
 
 
 def test_a_retreat_leaves_the_wall_and_ends_away_from_it() -> None:
     tilted = {"down": (0.3, 0.0, 0.954)}
     retreat = watched(30, **tilted)
     assert retreat.state is SafetyState.RETREAT, "the tip is still at the wall"
-    reference = retreat.supervised(PRESS)
+    reference = retreat.reference(PRESS)
     assert reference.standoff == SETTINGS.retreat_m and not reference.velocity.any()
     assert not reference.contact and reference.push_force == 0.0
     near = FREE._replace(distance=SETTINGS.retreat_m - 0.05)
@@ -66,59 +67,62 @@ def test_a_retreat_leaves_the_wall_and_ends_away_from_it() -> None:
 
 def test_a_vehicle_far_from_the_wall_stays_there() -> None:
     distant = watched(30, contact=FREE._replace(distance=0.8), down=(0.3, 0.0, 0.954), press=False)
-    assert distant.supervised(PRESS).standoff == 0.8
+    assert distant.reference(PRESS).standoff == 0.8
 
 
 def test_a_blind_vehicle_retreats_farther_and_comes_down() -> None:
     blind = watched(250, **STOPPED)
-    assert blind.state is SafetyState.RETREAT and blind.supervised(PRESS).standoff == SETTINGS.blind_retreat_m
+    assert blind.state is SafetyState.RETREAT and blind.reference(PRESS).standoff == SETTINGS.blind_retreat_m
     watched(2000, after=blind, contact=FREE, **STOPPED)
     assert blind.state is SafetyState.DESCEND
-    assert blind.supervised(PRESS).velocity.tolist() == [0.0, SETTINGS.descend_speed_m_s]
+    assert blind.reference(PRESS).velocity.tolist() == [0.0, SETTINGS.descend_speed_m_s]
 
 
 def test_a_descent_ends_on_the_ground_and_nowhere_else() -> None:
-    def descending() -> Assurance:
+    def descending() -> Supervision:
         return watched(5, contact=FREE, press=False, faults={Fault.NO_HOVER: ""})
 
     assert watched(300, after=descending(), contact=FREE, press=False).state is SafetyState.DESCEND
     ground = StubResponse(carried_weight=30.0)
     assert watched(20, ground, descending(), contact=FREE, press=False).state is SafetyState.DESCEND, "a gust"
     landed = watched(100, ground, descending(), contact=FREE, press=False)
-    assert landed.state is SafetyState.TERMINATED and landed.thrusts(LAST, FLOOR) is FLOOR
+    assert landed.state is SafetyState.TERMINATED and np.array_equal(landed.thrusts(StubResponse()), FLOOR)
 
 
 def test_without_an_attitude_the_last_thrusts_stay_and_then_none() -> None:
-    assurance = watched(5, faults={Fault.NO_ATTITUDE: ""})
-    assert assurance.thrusts(LAST, FLOOR) is LAST
-    assert watched(60, after=assurance, faults={Fault.NO_ATTITUDE: ""}).thrusts(LAST, FLOOR) is FLOOR
+    supervision = watched(5, faults={Fault.NO_ATTITUDE: ""})
+    np.testing.assert_array_equal(supervision.thrusts(StubResponse()), LAST)
+    ended = watched(60, after=supervision, faults={Fault.NO_ATTITUDE: ""})
+    np.testing.assert_array_equal(ended.thrusts(StubResponse()), FLOOR)
 
 
 @pytest.mark.parametrize("values", [{"wrench_ns": 0}, {"faults": {Fault.WRENCH_FROZEN: ""}}])
 def test_a_faulty_force_sensor_is_replaced_by_inertial_data(values: dict[str, Any]) -> None:
     response = StubResponse(inertial_push=7.0)
-    wrench = watched(30, response, **values).wrench(response)
-    assert wrench is not None
+    faulty = watched(30, response, **values)
+    wrench, stamp_ns = faulty.contact_wrench(SAMPLE, 9, False, response)
+    assert stamp_ns == 9
     np.testing.assert_allclose(wrench[:3], -7.0 * np.array(CONTACT.normal))
-    np.testing.assert_allclose(wrench[3:], np.cross(VEHICLE.tip_position_m, wrench[:3]))
-    pulled = watched(30, response, **values).wrench(StubResponse(inertial_push=-3.0))
-    assert pulled is not None and not pulled.any(), "no wall pulls"
+    np.testing.assert_allclose(wrench[3:], np.cross(CONFIG.vehicle.tip_position_m, wrench[:3]))
+    pulled, _ = faulty.contact_wrench(SAMPLE, 9, False, StubResponse(inertial_push=-3.0))
+    assert not pulled.any(), "no wall pulls"
+    assert not faulty.contact_wrench(SAMPLE, 9, True, response)[0].any(), "turned from the wall"
 
 
 def test_a_rotor_that_does_not_follow_is_a_fault_with_limits() -> None:
     lost = np.zeros(6)
     lost[2] = 8.0
-    assurance = watched(30, StubResponse(missing_thrust=lost))
-    assert assurance.state is SafetyState.RETREAT and Fault.ROTOR in assurance.faults
-    limits = assurance.limits(None)
+    supervision = watched(30, StubResponse(missing_thrust=lost))
+    assert supervision.state is SafetyState.RETREAT and Fault.ROTOR in supervision.faults
+    limits = supervision.limits(None)
     assert limits is not None and limits[1][2] == pytest.approx(3.3)
 
 
 def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
-    assurance, off = Assurance(VEHICLE, SETTINGS), Assurance(VEHICLE, SafetySettings(supervise=False))
-    for each in (assurance, off):
-        assert all(each.is_news(number) for number in range(20))
-    assert not assurance.is_news(19) and assurance.is_news(20) and off.is_news(19)
+    supervision, off = Supervision(CONFIG, SETTINGS), Supervision(CONFIG, SafetySettings(supervise=False))
+    for each in (supervision, off):
+        assert all(each.is_new_picture(number) for number in range(20))
+    assert not supervision.is_new_picture(19) and supervision.is_new_picture(20) and off.is_new_picture(19)
 
 
 def test_the_command_tells_state_and_reasons() -> None:

@@ -1,4 +1,4 @@
-"""What the supervisor does about every fault: states, delays and recovery, as one table."""
+"""Faults, and the reaction to each as one table: states, delays and recovery."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NOMINAL, DEGRADED, RETREAT, HOVER, DESCEND, TERMINATED = SafetyState
 
 
 class Fault(StrEnum):
-    """Conditions that the monitors detect (`ibvs_qp.safety.monitors`)."""
+    """Conditions that the monitors detect (`ibvs_qp.supervision.monitors`)."""
 
     INPUTS = "sensor data in other axes"
     WRENCH_STALE = "no force sample"

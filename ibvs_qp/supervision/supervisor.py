@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ibvs_qp.command import SafetyState
-from ibvs_qp.safety.policy import POLICY, Fault, Rule
+from ibvs_qp.supervision.faults import POLICY, Fault, Rule
 
 _SEVERITY = {state: index for index, state in enumerate(SafetyState)}
 

@@ -1,4 +1,4 @@
-"""A controller under supervision: what its caller passes never raises, and its time is the caller's."""
+"""A controller under supervision: what its caller passes never raises, time and ages are those of its stamps."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_scenes import TICK_NS, line_references
+from controller_scenes import FLOOR, TICK_NS, line_references
 from hostile_values import Raising
 from references import good_reference
 from small_vehicle import SmallVehicle
 
-from ibvs_qp.assured import Assured
+from ibvs_qp.checked_law import Inputs
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
+from ibvs_qp.supervision.assured import Assured
 
 RATE_STEP = 500.0 * 0.004
+PRESS = Reference(push_force=5.0, contact=True, lines=line_references(2))
+NAN = np.full(3, np.nan)
 
 
 @functools.cache
@@ -29,13 +32,22 @@ def built(number: int) -> Assured:
 
 
 def flown(number: int = 0, ticks: int = 20, **changes: Any) -> tuple[Assured, SmallVehicle, Command]:
+    """A flight so far, and its last command."""
     assured = built(number)
     assured.reset()
-    vehicle = SmallVehicle(assured.controller.config)
+    vehicle, command = SmallVehicle(assured.controller.config), None
     for _ in range(ticks):
         command = assured.step(vehicle.measure(**changes), good_reference())
         vehicle.fly(command.thrusts)
-    return assured, vehicle, command
+    return assured, vehicle, command  # type: ignore[return-value]
+
+
+def pressed(assured: Assured, vehicle: SmallVehicle, ticks: int, **changes: Any) -> Command:
+    """The last command of a press with sensors that are changed."""
+    for _ in range(ticks):
+        command = assured.step(vehicle.measure(**changes), PRESS)
+        vehicle.fly(command.thrusts)
+    return command
 
 
 @pytest.mark.parametrize("contact", [np.zeros(2), np.zeros(0), Raising(), None, 1])
@@ -62,7 +74,7 @@ def test_a_failing_monitor_is_named_and_the_thrusts_of_the_law_fly(monkeypatch: 
     def fails(*_: Any) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(assured.assurance, "watch", fails)
+    monkeypatch.setattr(assured.supervision, "watch", fails)
     for _ in range(5):
         seen = vehicle.measure()
         command = assured.step(seen, good_reference())
@@ -180,6 +192,59 @@ def test_a_lost_rotor_brings_the_vehicle_down_upright(rotor: int) -> None:
         assert vehicle.attitude.as_matrix()[2, 2] > math.cos(math.radians(30.0))
     assert command.safety is SafetyState.DESCEND and "no level hover" in command.safety_reasons[0]
     assert 0.2 < vehicle.velocity[2] < 1.0
+
+
+def test_a_quiet_approach_is_the_controllers_own() -> None:
+    assured, vehicle, _ = flown(ticks=0)
+    twin, alone = SmallVehicle(assured.controller.config), HybridController()
+    for _ in range(60):
+        command, own = assured.step(vehicle.measure(), PRESS), alone.step(twin.measure(), PRESS)
+        np.testing.assert_array_equal(command.thrusts, own.thrusts)
+        assert command.safety is SafetyState.NOMINAL and command.mode == "approach"
+        vehicle.fly(command.thrusts)
+        twin.fly(own.thrusts)
+
+
+def test_a_lost_force_sensor_ends_the_press_and_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown_by: list[Measurement | None] = []
+    assured, vehicle, _ = flown(ticks=0)
+    respond = assured.controller.respond
+
+    def noted(inputs: Inputs) -> Command:
+        flown_by.append(inputs.measurement)
+        return respond(inputs)
+
+    monkeypatch.setattr(assured.controller, "respond", noted)
+    pressed(assured, vehicle, 20)
+    command = pressed(assured, vehicle, 60, contact_wrench=NAN)
+    assert command.safety is SafetyState.RETREAT and command.safety_reasons[0].startswith("no force sample: ")
+    assert command.mode == "free", "no approach any more"
+    last = flown_by[-1]
+    assert last is not None and last.wrench_stamp_ns == last.stamp_ns and not np.isnan(last.contact_wrench).any()
+
+
+def test_without_an_attitude_the_thrusts_stay_and_then_end() -> None:
+    assured, vehicle, _ = flown(ticks=0)
+    pressed(assured, vehicle, 20)
+    held = pressed(assured, vehicle, 10, attitude=np.full(4, np.nan))
+    assert held.safety is SafetyState.DEGRADED and held.outcome is Outcome.HOLD
+    again = pressed(assured, vehicle, 1, attitude=np.full(4, np.nan))
+    np.testing.assert_array_equal(again.thrusts, held.thrusts)
+    ended = pressed(assured, vehicle, 80, attitude=np.full(4, np.nan))
+    assert ended.safety is SafetyState.TERMINATED
+    np.testing.assert_allclose(ended.thrusts, FLOOR, atol=1e-6)
+    back = pressed(assured, vehicle, 1)
+    np.testing.assert_allclose(back.thrusts, FLOOR, atol=1e-6, err_msg="the attitude is back")
+
+
+def test_lines_that_stop_are_a_fault_once_there_were_some() -> None:
+    assured, vehicle, _ = flown(ticks=0)
+    assert pressed(assured, vehicle, 80, lines=()).safety is SafetyState.NOMINAL
+    seen = vehicle.measure()
+    stamped = tuple(replace(line, stamp_ns=seen.stamp_ns) for line in seen.lines)
+    assert pressed(assured, vehicle, 40, lines=stamped).safety is SafetyState.NOMINAL
+    command = pressed(assured, vehicle, 20, lines=())
+    assert command.safety is SafetyState.DEGRADED and command.safety_reasons[0].startswith("no picture: ")
 
 
 def noisy(seen: Measurement, rng: np.random.Generator) -> Measurement:

@@ -11,7 +11,7 @@ from controller_scenes import CEILING, FLOOR, attitude, measured
 from allocation import control_effectiveness
 from ibvs_qp.analysis.motion import TICKS_LATE, MotionLoop
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.safety.hover import hold_thrusts, hover_gains
+from ibvs_qp.model.hover import hold_thrusts, hover_gains
 
 CONFIG = ControllerConfig()
 MATRIX = control_effectiveness(CONFIG.vehicle.geometry)

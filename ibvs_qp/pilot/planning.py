@@ -1,0 +1,94 @@
+"""Planning of a flight: what the strategy gets of the estimates, its command, and the reference that follows."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import MappingProxyType
+
+import numpy as np
+
+from ibvs_qp.command import SafetyState
+from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.frames import to_camera
+from ibvs_qp.measurement import Reference
+from ibvs_qp.painting.command import PainterInput, PaintingCommand, image_reference
+from ibvs_qp.painting.painter import Painter
+from ibvs_qp.painting.strategy import Strategy, require_strategy
+from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.estimation import ASSUMED_DISTANCE, Estimation
+from ibvs_qp.supervision.supervision import Limits, Supervision
+
+#: States in which the strategy flies.
+FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
+
+
+class Planning:
+    """Runs the strategy; the supervisor ends its job.
+
+    Attributes:
+        painter: The strategy.
+        time_s: Time of the tick since the first one [s].
+
+    Args:
+        config: Configuration of the flight.
+        painter: Strategy to follow; None paints the job of the configuration.
+    """
+
+    def __init__(self, config: PilotConfig, painter: Strategy | None) -> None:
+        vehicle = config.controller.vehicle
+        tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
+        self._tip_right, self._tip_below, self._tip_ahead = to_camera(tip, camera).tolist()
+        self.painter: Strategy = require_strategy(Painter(config.painting) if painter is None else painter)
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the flight."""
+        self.painter.reset()
+        self.time_s = 0.0
+
+    def note(self, name: str, text: str) -> None:
+        """Add an event to the strategy's log, unless its text is empty."""
+        if text:
+            self.painter.log.append((self.time_s, name, text))
+
+    def plan(
+        self,
+        estimation: Estimation,
+        supervision: Supervision,
+        limits: Limits | None,
+        push_reference: float,
+        dt: float,
+        rejected: list[str],
+    ) -> PaintingCommand:
+        """Command of the strategy, tilted after the loss of a rotor; the supervisor may end its job.
+
+        ``push_reference`` is that of the tick before: the controller runs after the strategy.
+        """
+        motion, contact, rotors = estimation.motion, estimation.contact.state, supervision.rotor_loss
+        inputs = PainterInput(
+            time_s=self.time_s,
+            lines=MappingProxyType(motion.lines),  # a strategy of the user's must not lose lines of the filter
+            odometer=motion.state[4:6],
+            velocity=motion.state[:2],
+            distance=contact.distance,
+            wall_known=contact.known,
+            in_contact=contact.in_contact,
+            time_since_touch=contact.time_since_touch,
+            push=contact.push,
+            push_reference=push_reference,
+            tared=estimation.tare.ready,
+        )
+        if rotors.update(limits):
+            self.painter.abandon(inputs, "no level hover is left")
+        elif supervision.state not in FLYING and not self.painter.descending:
+            self.painter.stop(inputs, "; ".join(supervision.supervisor.reasons))
+        command = self.painter.fly(inputs)
+        if self.painter.fault:
+            rejected.append(self.painter.fault)
+        attitude = rotors.target(contact, estimation.inertial.attitude, motion.state[0], dt)
+        return dataclasses.replace(command, **attitude) if attitude else command
+
+    def reference(self, command: PaintingCommand, contact: ContactState) -> Reference:
+        """Reference of a command at the measured distance."""
+        depth = self._tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
+        return image_reference(command, depth, self._tip_below, self._tip_right)

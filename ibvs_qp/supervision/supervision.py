@@ -1,0 +1,259 @@
+"""Supervision of one flight: what monitors and state machine do to reference, limits, contact wrench and thrusts.
+
+A complex function (strategy, estimation, program) flies; simple monitors compare its inputs and effects with bounds,
+and a state machine replaces its reference, and at last its thrusts, by safe ones (run-time assurance, ASTM F3269).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from allocation import control_effectiveness
+from ibvs_qp.command import Command, Outcome, SafetyState
+from ibvs_qp.config import ControllerConfig, SafetySettings
+from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.frames import GRAVITY
+from ibvs_qp.measurement import Reference
+from ibvs_qp.model.reporting import fixed_command
+from ibvs_qp.model.setpoints import Setpoints
+from ibvs_qp.supervision.faults import Fault
+from ibvs_qp.supervision.monitors import (
+    EnvelopeMonitor,
+    Persistence,
+    PushMonitor,
+    RotorMonitor,
+    SampleMonitor,
+    Tick,
+    WallMonitor,
+)
+from ibvs_qp.supervision.rotor_loss import RotorLoss
+from ibvs_qp.supervision.supervisor import Supervisor
+from ibvs_qp.validation.load_check import LoadCheck
+from ibvs_qp.validation.self_check import SelfCheck
+
+#: Faults of the force sensor, and of the camera.
+_WRENCH = (Fault.WRENCH_STALE, Fault.WRENCH_FROZEN, Fault.PUSH_UNFELT)
+_BLIND = (Fault.IMAGE_STALE, Fault.IMAGE_FROZEN, Fault.PLANE_STALE)
+#: Faults after which the vehicle moves by tilting, less precisely.
+_TILTING = (Fault.ROTOR, Fault.NO_HOVER)
+#: Outcomes without a solution of the program.
+_UNSOLVED = (Outcome.ANALYTIC_FALLBACK, Outcome.HOLD)
+#: A retreat has ended this far before its distance [m].
+RETREAT_REACHED = 0.03
+#: Least distance at which a degraded vehicle that shall not touch the wall stops [m].
+LEAST_STOP = 0.05
+#: Lower and upper thrust limits [N], (n,) each.
+Limits = tuple[np.ndarray, np.ndarray]
+#: Contact wrench [N, N m], (6,), and its stamp.
+WrenchSample = tuple[np.ndarray, int]
+_STILL = np.zeros(2)
+_STILL.flags.writeable = False
+
+
+class Supervision:
+    """Watches every tick and supervises the next one; `Pilot` and `Assured` hand it what they have.
+
+    Attributes:
+        settings: Bounds of the monitors and motions of the states.
+        supervisor: The state machine.
+        rotor_loss: Flight without a level hover.
+        self_check: Start-up check of the sensors' axes.
+
+    Args:
+        config: Vehicle and gains.
+        settings: Bounds and motions; None takes the defaults.
+        load: Check of the force sensor by the tool's load, for raw readings; None for a tared wrench.
+    """
+
+    def __init__(
+        self, config: ControllerConfig, settings: SafetySettings | None = None, load: LoadCheck | None = None
+    ) -> None:
+        self.settings = settings = settings or SafetySettings()
+        vehicle = config.vehicle
+        self._tick_s, self._weight, self._tip = config.tick_s, vehicle.mass_kg * GRAVITY, vehicle.tip_position_m
+        self.supervisor, self.self_check = Supervisor(), SelfCheck(settings.self_check, load)
+        self.rotor_loss = RotorLoss(vehicle, config.gains)
+        self._rotors = RotorMonitor(vehicle, control_effectiveness(vehicle.geometry), settings)
+        self._samples, self._push = SampleMonitor(settings), PushMonitor(settings)
+        self._wall, self._envelope = WallMonitor(settings), EnvelopeMonitor(settings)
+        self._grounded = Persistence(settings.landed_time_s)
+        self.reset()
+
+    def reset(self) -> None:
+        """As before the flight."""
+        monitors = (self._samples, self._rotors, self._push, self._wall, self._envelope, self._grounded)
+        for part in (self.supervisor, self.self_check, self.rotor_loss, *monitors):
+            part.reset()
+        self._last: Tick | None = None
+        self._first_ns = self._imu_ns = -1
+        self._time_s, self._retreat_m = 0.0, self.settings.retreat_m
+
+    @property
+    def state(self) -> SafetyState:
+        """State of the supervisor, for the next tick."""
+        return self.supervisor.state
+
+    @property
+    def faults(self) -> Mapping[Fault, str]:
+        """Faults of the last tick, with details."""
+        return self._last.faults if self._last is not None else {}
+
+    # ------------------------------------------------------------------ inputs
+
+    def is_new_picture(self, picture: object) -> bool:
+        """Whether a picture differs from the last one, if the camera has noise; one that repeats shows nothing."""
+        return self._samples.add_picture(picture) or not self.settings.supervise
+
+    def imu_stamp(self, sampled: bool, stamp_ns: int, *stamps: int | None) -> int:
+        """Stamp of the oldest inertial sample, -1 before the first; ``sampled``: whether this tick has all of them.
+
+        ``stamps`` are those of attitude and inertial unit, None for at the tick.
+        """
+        if sampled:
+            self._imu_ns = min([stamp_ns, *(stamp for stamp in stamps if stamp is not None)])
+        return self._imu_ns
+
+    def check_axes(
+        self,
+        inertial: tuple[Sequence[float], Sequence[float], Sequence[float]] | None,
+        force: Sequence[float] | None,
+        contact: ContactState,
+        dt: float,
+    ) -> tuple[str, ...]:
+        """Self-check with those sensors that the tick has; what it found, for `Command.rejected`.
+
+        ``inertial`` are attitude, gyro and accelerometer as measured, ``force`` is that of the vehicle on the tool [N].
+        """
+        if inertial is not None:
+            self.self_check.inertial(*inertial, dt)
+        if force is not None:
+            self.self_check.contact(force, contact.push_noise, contact.normal, contact.distance, dt)
+        return tuple([f"self-check: {fault}" for fault in self.self_check.faults()])
+
+    def contact_wrench(self, sample: WrenchSample, now_ns: int, turned: bool, setpoints: Setpoints) -> WrenchSample:
+        """Contact wrench: by inertial data while the force sensor is faulty.
+
+        It is zero for a vehicle that has turned from the wall: its sensor measures the tool that swings round.
+        """
+        wrench, stamp_ns = sample
+        last = self._last
+        if last is not None and last.faults and self.settings.supervise:
+            if any(fault in last.faults for fault in _WRENCH):
+                force = -max(setpoints.inertial_push, 0.0) * np.array(last.contact.normal)
+                wrench, stamp_ns = np.concatenate((force, np.cross(self._tip, force))), now_ns
+        return np.zeros(6) if turned else wrench, stamp_ns
+
+    # --------------------------------------------------------------- decisions
+
+    def limits(self, reported: Limits | None) -> Limits | None:
+        """Limits of rotors that do not follow, within those that the drive reports; None without either.
+
+        Args:
+            reported: Lower and upper thrust limits [N], (n,) each, or None for the configured ones.
+        """
+        found = self._rotors.limits if self.settings.supervise else None
+        if reported is None or found is None:
+            return found if reported is None else reported
+        lower = np.maximum(reported[0], found[0])
+        return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
+
+    def reference(self, wanted: Reference) -> Reference:
+        """The reference that the state allows in place of the caller's."""
+        state, last = self.state, self._last
+        if state is SafetyState.NOMINAL or last is None:
+            return wanted
+        if state is SafetyState.DEGRADED:  # no travel, and no new contact
+            pressing = wanted.contact and last.contact.in_contact
+            stop = wanted.standoff if not wanted.contact else max(last.contact.distance, LEAST_STOP)
+            return dataclasses.replace(wanted, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
+        down = np.array((0.0, self._descend_speed)) if state is SafetyState.DESCEND else _STILL
+        return Reference(standoff=self._retreat_m, velocity=down, tilt=wanted.tilt, trim=wanted.trim)
+
+    @property
+    def _descend_speed(self) -> float:
+        """Speed of a descent [m/s]: fast without a hover, because the vehicle turns ever faster."""
+        fast = Fault.NO_HOVER in self.faults
+        return self.settings.fast_descend_speed_m_s if fast else self.settings.descend_speed_m_s
+
+    def thrusts(self, setpoints: Setpoints) -> np.ndarray | None:
+        """Thrusts in place of those of the law [N], (n,); None while the law flies."""
+        if self.state is SafetyState.TERMINATED:
+            return setpoints.floor
+        return setpoints.last if Fault.NO_ATTITUDE in self.faults and self.settings.supervise else None
+
+    def command(
+        self, law: Callable[[], Command], setpoints: Setpoints, stamp_ns: int, rejected: tuple[str, ...] = ()
+    ) -> tuple[Command, np.ndarray | None]:
+        """Command of the law, or of the supervisor where it replaces the law; and the supervisor's thrusts then."""
+        fixed = self.thrusts(setpoints)
+        if fixed is not None:
+            return fixed_command(setpoints, stamp_ns, fixed, rejected), fixed
+        return law(), None
+
+    def explained(self, command: Command) -> Command:
+        """The command with state and reasons."""
+        if self.state is SafetyState.NOMINAL:
+            return command
+        return dataclasses.replace(command, safety=self.state, safety_reasons=self.supervisor.reasons)
+
+    # -------------------------------------------------------------- monitoring
+
+    def watch(self, tick: Tick, setpoints: Setpoints) -> SafetyState:
+        """Compare one tick with all bounds.
+
+        Returns:
+            The state, which holds for the next tick.
+        """
+        if self._first_ns < 0:
+            self._first_ns = tick.stamp_ns
+        time_s = self._time_s = max((tick.stamp_ns - self._first_ns) * 1e-9, self._time_s)
+        self._last = tick
+        self._detect(tick, setpoints, time_s)
+        if not self.settings.supervise:
+            return self.state
+        before, distance = self.state, tick.contact.distance
+        if before is SafetyState.NOMINAL and not tick.faults:
+            return self.supervisor.update(time_s, tick.faults)
+        if any(fault in tick.faults for fault in _BLIND):
+            self._retreat_m = max(self._retreat_m, self.settings.blind_retreat_m)
+        if any(fault in tick.faults for fault in _TILTING):
+            self._retreat_m = max(self._retreat_m, self.settings.tilting_retreat_m)
+        retreated = distance > self._retreat_m - RETREAT_REACHED and not tick.contact.in_contact
+        carried = setpoints.carried_weight > self.settings.landed_ratio * self._weight
+        landed = self._grounded.update(before is SafetyState.DESCEND and carried, time_s)
+        state = self.supervisor.update(time_s, tick.faults, retreated=retreated, landed=landed)
+        if state is not before and math.isfinite(distance):  # a vehicle farther away stays there
+            self._retreat_m = max(self._retreat_m, distance)
+        return state
+
+    def _detect(self, tick: Tick, setpoints: Setpoints, time_s: float) -> None:
+        """Add all faults to those that the caller found."""
+        if self.rotor_loss.lost:
+            tick.faults[Fault.NO_HOVER] = ""
+        if found := self.self_check.faults():
+            tick.faults[Fault.INPUTS] = "; ".join(found)
+        self._samples.update(tick)
+        self._push.update(tick, setpoints, time_s)
+        if found := self._rotors.update(
+            setpoints.missing_thrust, setpoints.missing_noise, setpoints.motor_thrusts, time_s
+        ):
+            tick.faults[Fault.ROTOR] = found
+        self._envelope.update(tick, time_s)
+        self._wall.update(tick, time_s)
+        if tick.outcome in _UNSOLVED:
+            tick.faults[Fault.SOLVER] = str(tick.outcome)
+
+    def miss(self) -> SafetyState:
+        """Count a tick without a usable input, which has no time of its own; nothing can be compared with a bound.
+
+        Returns:
+            The state, which holds for the next tick.
+        """
+        if self._first_ns < 0 or not self.settings.supervise:  # before the first good tick nothing flies
+            return self.state
+        self._time_s += self._tick_s
+        return self.supervisor.update(self._time_s, {Fault.NO_INPUT: ""})
