@@ -11,11 +11,11 @@ import numpy as np
 from scipy import sparse
 
 from ibvs_qp.limits.limit import Limit
-from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.qp.row_check import check_rows
 from ibvs_qp.symbolic.bound_function import ArrayFunction
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
 
