@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +95,17 @@ def quaternion_from_vector(vector: Sequence[float] | np.ndarray) -> tuple[float,
     angle = float(np.linalg.norm(half))
     x, y, z = (half * np.sinc(angle / math.pi)).tolist()
     return math.cos(angle), x, y, z
+
+
+def quaternion_product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+    """Product of two quaternions (w, x, y, z), of numbers or of symbols."""
+    (a, b, c, d), (e, f, g, h) = first, second
+    return (
+        a * e - b * f - c * g - d * h,
+        a * f + b * e + c * h - d * g,
+        a * g - b * h + c * e + d * f,
+        a * h + b * g - c * f + d * e,
+    )
 
 
 def rotation_from_vector(vector: Sequence[float] | np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ class EstimationConfig:
     tare_follow_s: float = setting(20.0, "time constant of the bias after that", unit="s", low=0.5, high=1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", unit="m", low=0.005, high=1.0)
     tare_acceleration_gain: float = setting(
-        0.3, "accelerometer filter of the tool's load, per tick: about a force sample", low=0.001, high=1.0
+        0.3, "accelerometer filter of the tool's load, in 4 ms: about a force sample", low=0.001, high=1.0
     )
     force_std_n: float = setting(
         0.02, "least deviation of a force sample; the samples may show more", unit="N", low=1e-4, high=10.0

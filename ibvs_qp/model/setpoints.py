@@ -19,8 +19,7 @@ from ibvs_qp.model.inputs import LINE_OUTPUTS
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.packing import StepInputs
-from ibvs_qp.model.reach import UNBOUNDED
-from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.reach import UNBOUNDED, thrust_window
 from ibvs_qp.model.tick import TickFunction
 from ibvs_qp.safety.hover import hold_thrusts
 

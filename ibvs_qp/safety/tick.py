@@ -14,7 +14,7 @@ from ibvs_qp.safety.policy import Fault
 
 
 class Response(Protocol):
-    """Signals of the controller's last step (`ibvs_qp.model.response`)."""
+    """Signals of the controller's last step (`ibvs_qp.estimation.response`)."""
 
     @property
     def inertial_push(self) -> float:

@@ -39,7 +39,7 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.reach import thrust_window
 from ibvs_qp.qp.osqp import MAX_ITERATIONS, SOLVED, SOLVED_INACCURATE, OsqpSolver, RawSolution
 from ibvs_qp.qp.solution import BOUND_SLIP
 

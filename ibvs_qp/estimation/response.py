@@ -6,8 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.model.inputs import Body, Contact
-from ibvs_qp.model.motor_thrust import MotorThrust
+from ibvs_qp.estimation.inputs import Body, Contact, MotorThrust
 from ibvs_qp.symbolic.signals import Signals
 
 #: Bandwidth of the residual wrench [rad/s]: it has half of a step after 23 ms.
