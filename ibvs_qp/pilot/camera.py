@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ibvs_qp.estimation.estimator import Estimator
 from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
-from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
@@ -34,17 +34,17 @@ class CameraInput:
 
     Args:
         config: Configuration of the flight.
-        history: Attitude and turn at the time of capture.
+        estimator: Attitude and turn at the time of capture.
         seen_as: Applied to the features of every picture, for studies of perception errors.
     """
 
     def __init__(
         self,
         config: PilotConfig,
-        history: AttitudeHistory,
+        estimator: Estimator,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None,
     ) -> None:
-        self._config, self._history, self._seen_as = config, history, seen_as
+        self._config, self._estimator, self._seen_as = config, estimator, seen_as
         self._most_lines = LINES_PER_SLOT * config.controller.line_slots
         self._loader = PerceptionLoader(config)
         self._mount = TurnedCamera(config.controller.vehicle.camera_turn_deg)
@@ -120,8 +120,8 @@ class CameraInput:
         self.picture = self._camera.picture(image)
         self.perception_result = perception.process(
             self.picture,
-            attitude=np.array(self._history.attitude(image.stamp_ns)),
-            rotation=self._history.turn(last_ns, image.stamp_ns),
+            attitude=np.array(self._estimator.attitude_at(image.stamp_ns)),
+            rotation=self._estimator.turn(last_ns, image.stamp_ns),
             velocity=velocity,
             hints=hints,
         )
@@ -139,7 +139,7 @@ class CameraInput:
         if seen is not None:
             plane = self.plane if seen.plane is None else seen.plane
             motion = seen.velocity if velocity is None else velocity
-            seen = self._shutter.features(seen, image, plane, motion, self._history.rate(image.stamp_ns))
+            seen = self._shutter.features(seen, image, plane, motion, self._estimator.rate_at(image.stamp_ns))
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
 

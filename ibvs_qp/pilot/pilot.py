@@ -19,14 +19,12 @@ from ibvs_qp.analytic import PaperController
 from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.plane_acceleration import PlaneAcceleration
+from ibvs_qp.estimation.estimator import INERTIAL, Estimator
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
-from ibvs_qp.estimation.wall_motion import BIAS, WallMotion
-from ibvs_qp.estimation.wrench_tare import WrenchTare
-from ibvs_qp.frames import down_in_body, plane_in_body, rotation_from_vector, to_camera
+from ibvs_qp.estimation.wall_motion import BIAS
+from ibvs_qp.frames import down_in_body, rotation_from_vector, to_camera
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.reporting import fixed_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -34,11 +32,9 @@ from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.painting.painter import Painter
 from ibvs_qp.painting.reference import image_reference
 from ibvs_qp.painting.strategy import Strategy, require_strategy
-from ibvs_qp.pilot.attitude_history import AttitudeHistory
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
-from ibvs_qp.pilot.inertial import INERTIAL, InertialData
 from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
 from ibvs_qp.safety.assurance import Assurance
@@ -118,17 +114,11 @@ class Pilot:
         self._gate = SensorGate(self.config.camera.latest_s)
         self._limits = ThrustLimits(vehicle.geometry.count)
         self.self_check = SelfCheck(self.config.safety.self_check, LoadCheck(vehicle, self.config.safety))
-        self._inertial = InertialData(self._tip_from_camera, settings.tick_s)
         turn = vehicle.force_torque_turn_deg
         self._force_axes = rotation_from_vector(np.radians(turn)) if any(turn) else None
-        self.tare = WrenchTare(vehicle, self.config.estimation)
-        self.contact = ContactEstimator(settings)
-        self.motion = WallMotion(self._tip, camera, settings.tick_s, self.config.estimation)
-        self._plane_acceleration = PlaneAcceleration(
-            self.config.estimation, settings.brush.force_delay_s, settings.compiled
-        )
-        self._history = AttitudeHistory(self.motion.ticks)
-        self._camera = CameraInput(self.config, self._history, seen_as)
+        self.estimator = Estimator(settings, self.config.estimation)
+        self.contact, self.motion = self.estimator.contact, self.estimator.motion
+        self._camera = CameraInput(self.config, self.estimator, seen_as)
         self.rotor_loss = RotorLoss(vehicle, settings.gains)
         self.assurance = Assurance(vehicle, self.config.safety)
         self.push_report = PushReport()
@@ -154,18 +144,9 @@ class Pilot:
     def reset(self) -> None:
         """As after construction."""
         self._gate.reset()
-        self._inertial.reset(self._gate.last)
-        sensing = (self.self_check, self.tare, self._history, self._camera)
-        flying = (
-            self.contact,
-            self.motion,
-            self._plane_acceleration,
-            self.rotor_loss,
-            self.assurance,
-            self.painter,
-            self.controller,
-        )
-        for part in (*sensing, *flying, self.push_report):
+        self.estimator.reset(self._gate.last)
+        flying = self.rotor_loss, self.assurance, self.painter, self.controller
+        for part in (self.self_check, self._camera, *flying, self.push_report):
             part.reset()
         self._first = self._stamp = self._imu_stamp = -1
         self._covariance = self.motion.velocity_variance * np.eye(3)
@@ -262,48 +243,37 @@ class Pilot:
         self._first, self._stamp = stamp if self._first < 0 else self._first, stamp
         if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
             self._leaps = self._gate.clock.leaps
-            self.contact.doubt()
-            self.motion.doubt()
-            self._plane_acceleration.reset()
-        frame = self._levelled(self._in_body(frame), dt)
-        attitude, rate, force = self._inertial.attitude, self._inertial.rate, self._inertial.force
-        down = down_in_body(attitude)
-        wrench, wrench_stamp = self._contact_wrench(frame, force)
+            self.estimator.doubt()
+        frame = self._in_body(frame)
         # After a lost rotor the vehicle turns away from the wall: its pictures show something else, and the force
         # sensor measures the tool that swings round.
         if turned := self.rotor_loss.turns(self.contact.state.normal[0]):
-            wrench = np.zeros(6)
             if frame.features is not None or frame.image is not None:
                 self._rejected.append("picture: the vehicle is turned from the wall")
         features = None if turned else self._perceive(frame)
         surface_offset = self.contact.surface_offset
-        contact = self.contact.update(
-            stamp_ns=stamp,
-            angular_velocity=rate,
-            specific_force=force,
-            down=down,
-            contact_wrench=wrench,
-            wrench_stamp_ns=wrench_stamp,
+        contact = self.estimator.predict(
+            frame,
+            self._gate.last,
+            self._missing(frame),
+            motors=self.setpoints,
+            wrench=self._wrench_in_place(frame, turned),
             plane=self._camera.plane,
-            plane_stamp_ns=self._camera.plane_ns,
+            plane_ns=self._camera.plane_ns,
             press=self.reference.contact,  # of the tick before: the strategy needs the contact of this one
         )
         if self.contact.surface_offset > surface_offset:
             found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
             self.painter.log.append((1e-9 * (stamp - self._first), "wall", f"{found}: its distance starts anew there"))
         self._check_axes(frame, contact, dt)
-        axes = WallAxes.of(contact.normal, down)
-        plane = self._plane_acceleration
-        felt = (wrench[:3] / self.config.controller.vehicle.mass_kg).tolist()
-        use_model = contact.in_contact and self.motion.velocity_age_s < self.config.estimation.velocity_life_s
-        plane.update(dt, force, self.setpoints.motors_force, felt, contact.normal, use_model)
-        self.motion.predict(stamp, axes, plane.force, rate, dt, plane.density)
-        self._history.remember(attitude, rate, dt)
         if features is not None:
-            self._correct_motion(features, contact)
+            if self.estimator.correct(features):
+                self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
+            elif features.lines:
+                self._rejected.append("features.lines: not used before the first plane")
         target = self.painting_command = self._strategy(frame, contact, dt)
         self.reference = self.assurance.supervised(self._refer(target, contact))
-        self.measurement = self._measure(frame, (wrench, wrench_stamp), axes, target, contact)
+        self.measurement = self._measure(frame, target, contact)
         begin = time.perf_counter()
         command = self._command(stamp, contact)
         self.controller_time_s = time.perf_counter() - begin
@@ -320,17 +290,11 @@ class Pilot:
         force, moment = self._force_axes @ frame.wrench[:3], self._force_axes @ frame.wrench[3:]
         return dataclasses.replace(frame, wrench=np.concatenate((force, moment)))
 
-    def _levelled(self, frame: SensorFrame, dt: float) -> SensorFrame:
-        """The frame with the inertial data to fly by; those that fail are estimated."""
-        measured, inertial = self._gate.last, self._inertial
-        missing = {name for name in INERTIAL if name in self._gate.replaced} | self._stale(frame)
+    def _missing(self, frame: SensorFrame) -> set[str]:
+        """Inertial sensors that fail."""
         if Fault.IMU_FROZEN in self.assurance.faults:
-            missing = set(INERTIAL)
-        if not missing:
-            return inertial.measure(frame, measured, dt)
-        angles = {identity: line.angle for identity, line in self.motion.lines.items()}
-        normal = self.contact.state.normal
-        return inertial.estimate(frame, measured, missing, dt, motors=self.setpoints, normal=normal, angles=angles)
+            return set(INERTIAL)
+        return {name for name in INERTIAL if name in self._gate.replaced} | self._stale(frame)
 
     def _stale(self, frame: SensorFrame) -> set[str]:
         """Inertial sensors whose stamps are too old."""
@@ -358,7 +322,7 @@ class Pilot:
         now, motion, faults = self._gate.last, self.motion, dict[Fault, str]()
         if motion.refused_s > self.config.safety.refusal_s:
             faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
-        if self._inertial.lost:
+        if self.estimator.lost:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
         if self.rotor_loss.lost:
             faults[Fault.NO_HOVER] = ""
@@ -377,8 +341,8 @@ class Pilot:
             lines_ns=self.motion.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
-            down=down_in_body(self._inertial.attitude),
-            rate=self._inertial.rate,
+            down=self.estimator.axes.gravity,
+            rate=self.estimator.rate,
             speed=math.hypot(right, down, contact.speed),
             height=-motion.state[5],
             contact=contact,
@@ -390,19 +354,12 @@ class Pilot:
             plane_doubt=self._camera.plane_doubt,
         )
 
-    def _contact_wrench(self, frame: SensorFrame, specific_force: list[float]) -> tuple[np.ndarray, int]:
-        """Contact wrench and its time: the tared one, or that of inertial data while the sensor is faulty."""
-        tared, inertial = self._tared_wrench(frame, specific_force), self.assurance.wrench(self.setpoints)
-        return (tared, frame.wrench_stamp_ns) if inertial is None else (inertial, frame.stamp_ns)
-
-    def _tared_wrench(self, frame: SensorFrame, specific_force: list[float]) -> np.ndarray:
-        """Contact wrench on the vehicle [N, N m], (6,); the bias is averaged while the tip is away from the wall.
-
-        Away by the contact of the tick before, because the contact of this tick needs the wrench.
-        """
-        last = self.contact.state
-        free = not last.in_contact and last.distance > self.config.estimation.tare_distance_m
-        return self.tare.update(frame.wrench, frame.wrench_stamp_ns, specific_force, free)
+    def _wrench_in_place(self, frame: SensorFrame, turned: bool) -> tuple[np.ndarray, int] | None:
+        """Contact wrench in place of the force sensor's, and its time: by inertial data while that is faulty."""
+        wrench, stamp = self.assurance.wrench(self.setpoints), frame.stamp_ns
+        if turned:
+            return np.zeros(6), frame.wrench_stamp_ns if wrench is None else stamp
+        return None if wrench is None else (wrench, stamp)
 
     def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> None:
         """Self-check with those raw sensors that the tick has; it names what it found in every command."""
@@ -412,7 +369,7 @@ class Pilot:
         if "wrench" not in missing:
             free = contact.known and contact.distance > self.config.estimation.tare_distance_m
             noted = check.note
-            check.load(frame.wrench, frame.wrench_stamp_ns, self._inertial.force, free, dt)
+            check.load(frame.wrench, frame.wrench_stamp_ns, self.estimator.force, free, dt)
             if check.note != noted:
                 self.painter.log.append((1e-9 * (self._stamp - self._first), "force sensor", check.note))
             check.contact(frame.wrench[:3].tolist(), contact.push_noise, contact.normal, contact.distance, dt)
@@ -431,7 +388,7 @@ class Pilot:
         expected, contact = self.painter.expected_edge(), self.contact.state
         if expected is None or not contact.known:
             return ()
-        axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
+        axes = WallAxes.of(contact.normal, down_in_body(self.estimator.attitude_at(stamp_ns)))
         level = expected.role == HORIZONTAL
         angle = 0.5 * math.pi if level else 0.0
         rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
@@ -439,23 +396,6 @@ class Pilot:
         if span[0] >= span[1]:
             return ()
         return (LineHint(name="fresh", rho=rho, theta=theta, kind="paint", surface_side=expected.side, span=span),)
-
-    # -------------------------------------------------------------- estimation
-
-    def _correct_motion(self, features: FeatureFrame, contact: ContactState) -> None:
-        """Correct motion and lines at the time of capture."""
-        if features.plane is not None and self.contact.plane_ns == features.stamp_ns:
-            normal, distance = plane_in_body(self.contact.on_felt_surface(features.plane), self._tip_from_camera)
-        elif contact.known:
-            normal, distance = contact.normal, contact.distance
-        else:
-            if features.lines:
-                self._rejected.append("features.lines: not used before the first plane")
-            return
-        self._inertial.correct(features, distance)
-        gravity = down_in_body(self._history.attitude(features.stamp_ns))
-        self.motion.correct(features, WallAxes.of(normal, gravity), distance)
-        self._covariance = self.motion.velocity_variance * np.eye(3)  # changes nowhere else
 
     # ------------------------------------------------- strategy and controller
 
@@ -473,7 +413,7 @@ class Pilot:
             time_since_touch=contact.time_since_touch,
             push=contact.push,
             push_reference=self.setpoints.push_reference,  # of the tick before: the controller runs after the strategy
-            tared=self.tare.ready,
+            tared=self.estimator.tared,
         )
         if self.rotor_loss.update(self.assurance.limits(self.thrust_limits)):
             self.painter.abandon(inputs, "no level hover is left")
@@ -482,7 +422,7 @@ class Pilot:
         target = self.painter.fly(inputs)
         if self.painter.fault:
             self._rejected.append(self.painter.fault)
-        attitude = self.rotor_loss.target(contact, self._inertial.attitude, motion.state[0], dt)
+        attitude = self.rotor_loss.target(contact, self.estimator.attitude, motion.state[0], dt)
         return dataclasses.replace(target, **attitude) if attitude else target
 
     def _refer(self, target: PaintingCommand, contact: ContactState) -> Reference:
@@ -494,13 +434,12 @@ class Pilot:
     def _measure(
         self,
         frame: SensorFrame,
-        sample: tuple[np.ndarray, int],
-        axes: WallAxes,
         target: PaintingCommand,
         contact: ContactState,
     ) -> Measurement:
         """Measurement of the tick from sensors and estimates; no velocity if the last one is too old."""
-        velocity = covariance = None
+        estimator, velocity, covariance = self.estimator, None, None
+        axes = estimator.axes
         inertial = self.rotor_loss.lost or self.assurance.state not in _FLYING
         if inertial or self.motion.velocity_age_s < self.config.estimation.velocity_life_s:
             (right, down, *_), rate = self.motion.state, -contact.speed if self.rotor_loss.lost else contact.rate
@@ -510,14 +449,13 @@ class Pilot:
         bias_right, bias_down = self.motion.state[BIAS]
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
         low, high = self.assurance.limits(self.thrust_limits) or (None, None)
-        wrench, wrench_stamp = sample
         return Measurement(
             stamp_ns=frame.stamp_ns,
-            attitude=frame.attitude,
-            angular_velocity=frame.angular_velocity,
-            specific_force=frame.specific_force,
-            contact_wrench=wrench,
-            wrench_stamp_ns=wrench_stamp,
+            attitude=np.array(estimator.attitude),
+            angular_velocity=np.array(estimator.rate),
+            specific_force=np.array(estimator.force),
+            contact_wrench=np.array(estimator.wrench),
+            wrench_stamp_ns=estimator.wrench_ns,
             lines=tuple([self.motion.feature(line, axes, distance, frame.stamp_ns) for line, _ in target.guides]),
             plane=self._camera.plane and self.contact.on_felt_surface(self._camera.plane),
             plane_stamp_ns=self._camera.plane_ns,
