@@ -237,7 +237,7 @@ class Estimator:
             frame: Stamps and force sensor.
             measured: The last accepted inertial data.
             missing: Names of the inertial sensors that fail.
-            motors: What the motors' model says.
+            motors: Signals of the motors' model.
             wrench: Contact wrench in place of the force sensor's [N, N m], (6,), and its time [ns].
             plane: (A, B, C, D) of the wall in C, or None.
             plane_ns: Time at which it was measured.
