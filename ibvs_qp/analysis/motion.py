@@ -6,7 +6,7 @@ A double integrator behind the motors' lag and the sampling, :math:`P(s) = e^{-s
     a = F(s) [-(K_p + K_i / s)\, x - K_d (\hat v + T \hat a)], \qquad
     \hat a = \frac{a}{\tau s + 1}, \qquad \hat v = \frac{\omega_g s\, x + \hat a}{s + \omega_g},
 
-the rate estimate of `ibvs_qp.model.angular_rate` with the gyro's bandwidth omega_g, the lead T and the filter of the
+the rate estimate of `ibvs_qp.estimation.attitude` with the gyro's bandwidth omega_g, the lead T and the filter of the
 row, :math:`F(s) = (1 - k_u) / (1 - k_u e^{-s \Delta t})` with :math:`k_u = e^{-\Delta t / T_u}`. Broken at the command,
 
 .. math::

@@ -59,6 +59,6 @@ class EstimationConfig(Checked):
     tare_time_s: float = setting(0.5, "free flight averaged before the wrench is trusted", "s", 0.05, 10.0)
     tare_follow_s: float = setting(20.0, "time constant of the bias after that", "s", 0.5, 1000.0)
     tare_distance_m: float = setting(0.04, "the tip counts as free beyond this distance", "m", 0.005, 1.0)
-    tare_acceleration_gain: float = setting(0.3, "accelerometer filter of the tool load, per tick", low=0.001, high=1.0)
+    tare_acceleration_gain: float = setting(0.3, "accelerometer filter of the tool load, in 4 ms", low=0.001, high=1.0)
     force_std_n: float = setting(0.02, "least deviation of a force sample; the samples may show more", "N", 1e-4, 10.0)
     contact_spread_m: float = setting(0.01, "largest distance of the contact from the tip's centre", "m", 0.0, 0.5)

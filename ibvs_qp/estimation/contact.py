@@ -1,4 +1,4 @@
-"""Contact estimator: wall distance, push, touch and stiffness combined into one `ContactState` per tick."""
+"""Contact: push, touch and its loss, with distance and stiffness of the wall as one `ContactState` per tick."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from ibvs_qp.config import LONGEST_TICK, ContactSettings, ControllerConfig
+from ibvs_qp.config import ContactSettings, ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.motion_history import MotionHistory
-from ibvs_qp.estimation.push import FIRST_PUSH_VARIANCE, PushFilter
-from ibvs_qp.estimation.stamps import sample_interval
-from ibvs_qp.estimation.stiffness import stiffness
-from ibvs_qp.estimation.touch import TouchDetector, touch_threshold
-from ibvs_qp.estimation.touch_compliance import MeasuredDistance, touch_compliance
-from ibvs_qp.estimation.wall_distance import Plane, Tick, WallDistance
-from ibvs_qp.symbolic.function import StepFunction
+from ibvs_qp.estimation.stiffness import MeasuredDistance, stiffness, touch_compliance
+from ibvs_qp.estimation.wall_distance import NEVER_S, Plane, Tick, WallDistance
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 
@@ -31,13 +25,13 @@ BLIND_S = 0.3
 FELT_PUSH, STOPPED_SPEED, STOPPED_S = 2.0, 0.02, 0.1
 #: The push noise is learned beyond this multiple of `contact_distance_m`.
 FREE_DISTANCES = 2.0
-#: A plane, (A, B, C, D); and the least part of its distance at which the tip can touch a surface before it.
-Plane4 = tuple[float, float, float, float]
-LEAST_RATIO = 0.1
 #: Entries of the estimate as results of the function, in the order of `ContactState` behind the normal.
 SCALARS = ContactState._fields[1:]
-#: Those that are true or false, and those that are infinite while no wall is known.
-FLAGS, UNKNOWN = ("known", "in_contact", "stiffness_known"), ("distance", "depth")
+#: Places of those that are true or false, and of those that are infinite while no wall is known.
+_FLAGS = tuple(SCALARS.index(name) for name in ("known", "in_contact", "stiffness_known"))
+_UNKNOWN = tuple(SCALARS.index(name) for name in ("distance", "depth"))
+#: Variance of the filtered push before free flight shows it [N^2].
+FIRST_PUSH_VARIANCE = 0.02
 
 
 def contact_state(
@@ -124,126 +118,138 @@ def contact_state(
     }
 
 
+class PushFilter:
+    """Filtered push and contact moment of one tick.
+
+    Attributes:
+        push: Filtered push [N].
+        push_noise: Its standard deviation in free flight [N].
+        moment_noise: Standard deviation of a filtered moment in free flight [N m].
+
+    Args:
+        signals: Registry.
+        settings: Filter and averaging time.
+        wrench: Contact wrench ON the vehicle [N, N m], (6,).
+        interval: Time since the last force sample [s]; 0 when there is no new one.
+        normal: Unit vector into the wall, in B, (3,).
+        free: Whether the vehicle flies away from the wall: a sample is noise.
+    """
+
+    def __init__(
+        self,
+        signals: Signals,
+        settings: ContactSettings,
+        wrench: ca.SX,
+        interval: ca.SX,
+        normal: ca.SX,
+        free: ca.SX,
+    ) -> None:
+        push, mean, moment_variance = (signals.state(f"push.{name}") for name in ("value", "mean", "moment_variance"))
+        variance = signals.state("push.variance", start=FIRST_PUSH_VARIANCE)
+        moment = signals.state("push.moment", 3)
+        gain = 1.0 - ca.exp(-2.0 * math.pi * settings.force_filter_hz * interval)
+        push = push + gain * (-ca.dot(wrench[:3], normal) - push)
+        moment = moment + gain * (wrench[3:] - moment)
+        learn = where(free, ca.fmin(1.0, interval / settings.estimation.noise_time_s), 0.0)
+        mean = mean + learn * (push - mean)
+        variance = variance + learn * ((push - mean) ** 2 - variance)
+        # Half the squared length: two of the three moments come from forces across the tip.
+        moment_variance = moment_variance + learn * (0.5 * ca.sumsqr(moment) - moment_variance)
+        for name, value in {
+            "value": push,
+            "mean": mean,
+            "variance": variance,
+            "moment": moment,
+            "moment_variance": moment_variance,
+        }.items():
+            signals.remember(f"push.{name}", value)
+        self.push, self.push_noise, self.moment_noise = push, ca.sqrt(variance), ca.sqrt(moment_variance)
+
+
+def touch_threshold(config: ControllerConfig, push_noise: ca.SX | float) -> ca.SX | float:
+    """Filtered push that counts as touch [N], given its standard deviation in free flight [N]."""
+    least, noise = config.contact.touch_force_n, config.contact.touch_sigmas * push_noise
+    return max(least, noise) if isinstance(noise, float) else ca.fmax(least, noise)
+
+
+class TouchDetector:
+    """State machine of two states, free and in contact.
+
+    - Free to contact: `touch_samples` force samples in a row exceed the threshold while the tip is nearer to the wall
+      than `contact_distance_m`.
+    - Contact to free: the push stays below `loss_force_n` for `loss_time_s`, or the tip is farther away than
+      `contact_distance_m`.
+
+    Attributes:
+        in_contact: The state; before `update` that of the last tick.
+        time: Time in contact [s], 0 while free.
+        pressed: After `add_sample`, whether enough force samples in a row exceeded the threshold.
+
+    Args:
+        signals: Registry.
+        config: Its `contact` settings and the switch `touch_ramp`.
+        dt: Bounded time since the last tick [s]: a stamp far ahead must not end the ramp.
+    """
+
+    def __init__(self, signals: Signals, config: ControllerConfig, dt: ca.SX) -> None:
+        self._signals, self._config, self._settings = signals, config, config.contact
+        state = signals.state
+        self.in_contact, self._samples = state("touch.in_contact"), state("touch.samples")
+        self.time = self.in_contact * (state("touch.time") + dt)
+        self._since_loss = state("touch.since_loss", start=NEVER_S) + dt
+        self._weak_for = state("touch.weak_for") + dt
+        self._weak = state("touch.weak")
+        self._ramp_start = state("touch.ramp_start")  # where the ramp of this contact starts, or the last one stopped
+
+    def add_sample(self, new: ca.SX, push: ca.SX, push_noise: ca.SX) -> None:
+        """Count a filtered force sample [N] towards a touch, if it is new."""
+        above = push > touch_threshold(self._config, push_noise)
+        self._samples = where(new, where(above, self._samples + 1.0, 0.0), self._samples)
+        self.pressed = self._samples >= self._settings.touch_samples
+
+    def update(self, push: ca.SX, distance: ca.SX) -> None:
+        """Decide on touch and loss by filtered push [N] and distance of the tip [m]."""
+        settings, estimation = self._settings, self._settings.estimation
+        touches = both(no(self.in_contact), self.pressed, distance < settings.contact_distance_m)
+        bounced = self._since_loss < estimation.bounce_time_s
+        latest = where(bounced, estimation.bounce_ramp * settings.ramp_s, 0.0)
+
+        weak = both(self.in_contact, push < settings.loss_force_n)
+        weak_for = where(self._weak, self._weak_for, 0.0)
+        lost = both(
+            self.in_contact,
+            either(both(weak, weak_for >= settings.loss_time_s), distance > settings.contact_distance_m),
+        )
+        start = where(touches, ca.fmin(self._ramp_start, latest), self._ramp_start + where(lost, self.time, 0.0))
+        self.in_contact = where(lost, 0.0, either(self.in_contact, touches))
+        self.time = where(either(touches, lost), 0.0, self.time)
+        for name, value in {
+            "in_contact": self.in_contact,
+            "samples": where(lost, 0.0, self._samples),
+            "time": self.time,
+            "since_loss": where(lost, 0.0, ca.fmin(self._since_loss, NEVER_S)),
+            "weak": weak,
+            "weak_for": weak_for,
+            "ramp_start": start,
+        }.items():
+            self._signals.remember(f"touch.{name}", value)
+        self._ramp_start = start
+
+    @property
+    def ramp(self) -> ca.SX:
+        """0 at touch to 1 after `ramp_s`, and 0 while free; always 1 without `touch_ramp`.
+
+        After a loss of less than `bounce_time_s` it resumes where it stopped.
+        """
+        if not self._config.touch_ramp:
+            return ca.SX(1.0)
+        return self.in_contact * ca.fmin((self._ramp_start + self.time) / self._settings.ramp_s, 1.0)
+
+
 def depth_weight(settings: ContactSettings, depth: ca.SX) -> ca.SX:
     r"""Lambda without its ramp: :math:`\tfrac12(1+\cos(\pi (d-d_{min})/(d_{max}-d_{min})))`, 1 below and 0 above."""
     ratio = (depth - settings.depth_min_m) / (settings.depth_max_m - settings.depth_min_m)
     return 0.5 * (1.0 + ca.cos(math.pi * ca.fmin(ca.fmax(ratio, 0.0), 1.0)))
-
-
-class ContactEstimator:
-    """Estimates wall normal, tip distance and rate, push, contact and lambda from sensors alone.
-
-    Attributes:
-        state: Result of the last update.
-        plane_ns: Capture time of the last accepted plane, -1 before the first.
-        surface_offset: Distance from the felt surface to the seen one [m], 0 while they are one.
-
-    Args:
-        config: Geometry and `contact` settings.
-    """
-
-    def __init__(self, config: ControllerConfig) -> None:
-        self._config, signals = config, Signals()
-        tick = Tick(
-            dt=signals.input("dt"),
-            elapsed=signals.input("elapsed"),
-            rate=signals.input("rate", 3),
-            force=signals.input("force", 3),
-            force_known=signals.input("force_known"),
-            down=signals.input("down", 3),
-            doubt=signals.input("doubt"),
-        )
-        plane = Plane(new=signals.input("plane_new"), age=signals.input("plane_age"), values=signals.input("plane", 4))
-        wrench, interval, press = signals.input("wrench", 6), signals.input("interval"), signals.input("press")
-        history = MotionHistory(signals, tick.elapsed, tick.rate, tick.acceleration, config.tick_s)
-        for name, value in contact_state(signals, config, tick, history, plane, wrench, interval, press).items():
-            signals.output(name, value)
-        self._step = StepFunction(signals, to_machine_code=config.compiled)
-        self._plane = np.array([0.0, 0.0, 1.0, -1.0])
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to the state before the first measurement."""
-        self._step.reset()
-        self._stamp = self._wrench_ns = self._plane_ns = self.plane_ns = -1
-        self._doubt, self.surface_offset = False, 0.0
-        self.state = no_contact(self._config)
-
-    @property
-    def touch_threshold(self) -> float:
-        """Filtered push that counts as touch [N]."""
-        return float(touch_threshold(self._config, self.state.push_noise))
-
-    def doubt(self) -> None:
-        """Ticks are missing for an unknown time."""
-        self._doubt = True
-
-    def update(
-        self,
-        *,
-        stamp_ns: int,
-        angular_velocity: Sequence[float],
-        specific_force: Sequence[float] | None,
-        down: Sequence[float],
-        contact_wrench: np.ndarray,
-        wrench_stamp_ns: int,
-        plane: Sequence[float] | None,
-        plane_stamp_ns: int,
-        press: bool = False,
-    ) -> ContactState:
-        """Update with the sensors of one tick; wrench and plane count once, when their stamps are new.
-
-        Args:
-            stamp_ns: Time of the tick.
-            angular_velocity: Omega in B [rad/s], (3,).
-            specific_force: Accelerometer in B [m/s^2], (3,), or None.
-            down: Unit vector of gravity in B, (3,).
-            contact_wrench: Tared wrench ON the vehicle at the centre of mass, FRD [N, N m], (6,).
-            wrench_stamp_ns: Time at which it was measured.
-            plane: (A, B, C, D) of the wall in C, or None.
-            plane_stamp_ns: Time at which it was measured.
-            press: Whether the tip shall press.
-        """
-        elapsed = self._config.tick_s if self._stamp < 0 else max((stamp_ns - self._stamp) * 1e-9, 0.0)
-        self._stamp = stamp_ns
-        new_plane = plane is not None and plane_stamp_ns > self._plane_ns
-        if plane is not None and new_plane:
-            self._plane_ns, self._plane[:] = plane_stamp_ns, plane
-        interval = 0.0
-        if wrench_stamp_ns > self._wrench_ns:
-            interval, self._wrench_ns = sample_interval(wrench_stamp_ns, self._wrench_ns), wrench_stamp_ns
-        self._step.advance()
-        self._step.values[:] = (
-            min(elapsed, LONGEST_TICK),
-            elapsed,
-            *angular_velocity,
-            *((0.0, 0.0, 0.0) if specific_force is None else specific_force),
-            specific_force is not None,
-            *down,
-            self._doubt,
-            new_plane,
-            (stamp_ns - self._plane_ns) * 1e-9 if new_plane else 0.0,
-            *self._plane,
-            *contact_wrench.tolist(),
-            interval,
-            press,
-        )
-        self._doubt = False
-        self._step.evaluate()
-        values = self._step.results.tolist()
-        self.state = read_contact(values)
-        self.surface_offset, accepted = values[-2:]
-        if accepted:
-            self.plane_ns = plane_stamp_ns
-        return self.state
-
-    def on_felt_surface(self, plane: Plane4) -> Plane4:
-        """A measured plane (A, B, C, D) in C, moved to the surface that the tip touches."""
-        if self.surface_offset == 0.0:
-            return plane
-        a, b, c, d = plane
-        ratio = max(1.0 - self.surface_offset * math.hypot(a, b, c) / abs(d), LEAST_RATIO)
-        return a / ratio, b / ratio, c / ratio, d
 
 
 def no_contact(config: ControllerConfig) -> ContactState:
@@ -273,9 +279,11 @@ def no_contact(config: ControllerConfig) -> ContactState:
 
 def read_contact(values: Sequence[float]) -> ContactState:
     """The estimate from the results of `contact_state` in their order: the normal first."""
-    state: dict[str, Any] = dict(zip(SCALARS, values[3:], strict=False))
-    state |= {name: bool(state[name]) for name in FLAGS}
-    if not state["known"]:
-        state |= dict.fromkeys(UNKNOWN, math.inf)
-    normal = values[0], values[1], values[2]
-    return ContactState(normal, **state)
+    x, y, z, *numbers = values[: 3 + len(SCALARS)]
+    state: list[Any] = numbers
+    for place in _FLAGS:
+        state[place] = state[place] != 0.0
+    if not state[_FLAGS[0]]:
+        for place in _UNKNOWN:
+            state[place] = math.inf
+    return ContactState((x, y, z), *state)

@@ -1,203 +1,128 @@
-"""Kalman filter for measurements that arrive late: predict every tick, correct at the time of capture."""
+"""Kalman filter of an integrator chain that is corrected by late measurements."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
+import casadi as ca
 import numpy as np
 
-from ibvs_qp.estimation.stamps import HISTORY, StampRing
+from ibvs_qp.symbolic.logic import Number, both, where
+from ibvs_qp.symbolic.signals import Signals
 
 #: Longest time between two corrections over which the covariance grows [s].
 LONGEST_GROWTH = 1.0
 
 
-class DelayedKalman:
-    r"""Integrator chain :math:`\dot x = G x + g(t)` with :math:`G^3 = 0`, corrected at past stamps.
+class LateKalman:
+    r"""Kalman filter of :math:`\dot x = G x + g(t)` with :math:`G^3 = 0`, corrected at past times.
 
-    Because G is nilpotent, a correction dx at the capture time has become
-    :math:`dx + t G dx + \tfrac12 t^2 G^2 dx` a time t later: exact, and one small product for the whole history,
-    instead of replaying the inputs (Larsen et al., 1998, on fusing delayed measurements). Over discrete ticks of
-    lengths h the two factors are :math:`\sum h_i` and :math:`\sum_{i<j} h_i h_j`. The covariance is that of the last
-    capture; a tick only touches the state.
+    Because G is nilpotent, a correction dx at the capture has become :math:`dx + t_1 G dx + t_2 G^2 dx` a time t later,
+    with :math:`t_1 = t,\ t_2 = t^2/2`, and over ticks of lengths h :math:`t_1 = \sum h_i,\ t_2 = \sum_{i<j} h_i h_j`:
+    exact, without replaying the inputs (Larsen et al., 1998, on fusing delayed measurements). The covariance is that of
+    the last capture; the caller keeps the state. An entry is its index, or a vector with a one at its place.
 
     Attributes:
-        chain: G, (n, n); may be written.
-        covariance: Of the state at the stamp of the last correction, (n, n); may be written.
-        noise: Power spectral densities of the process noise on the diagonal, (n, n) [unit^2/s]; may be written.
-        ticks: Stamps of the ticks remembered.
+        noise: Power spectral densities of the process noise [unit^2/s], (n,).
+        covariance: Of the state at the last capture, (n, n).
+
+    Args:
+        signals: Registry.
+        name: Of the filter's states.
+        chain: G, (n, n).
+        initial_std: Standard deviations at the start, (n,).
+        elapsed: Time since the last call [s].
     """
 
     def __init__(
-        self, chain: np.ndarray, noise: np.ndarray, initial_std: np.ndarray, tick_s: float, gate_sigmas: float
+        self, signals: Signals, name: str, chain: ca.SX | np.ndarray, initial_std: Sequence[float], elapsed: ca.SX
     ) -> None:
-        """Set up the filter.
+        self._size, self._signals, self._name, self._chain = len(initial_std), signals, name, ca.SX(chain)
+        self.noise: Sequence[Number] = [0.0] * self._size
+        lower = ca.Sparsity.lower(self._size)
+        start = ca.DM(np.diag(np.square(initial_std)))[lower].nonzeros()
+        self.covariance = ca.tril2symm(ca.SX(lower, signals.state(f"{name}.covariance", lower.nnz(), start)))
+        self._started, age = signals.state(f"{name}.corrected"), signals.state(f"{name}.covariance_age")
+        self._age = where(self._started, age + elapsed, 0.0)
 
-        Args:
-            chain: G, (n, n), nilpotent of degree 3.
-            noise: Power spectral densities of the process noise, (n,) [unit^2/s].
-            initial_std: Standard deviations at the start, (n,).
-            tick_s: Nominal control period [s].
-            gate_sigmas: Innovations beyond this many standard deviations are refused.
-        """
-        self.chain, self.noise = np.array(chain, float), np.diag(noise)
-        self._identity = np.eye(len(chain))
-        self._initial, self._gate = np.diag(np.square(initial_std)), gate_sigmas
-        self.ticks = StampRing(tick_s)
-        self.reset()
+    def _row(self, entry: int | ca.SX) -> ca.SX | ca.DM:
+        return ca.DM.eye(self._size)[:, entry] if isinstance(entry, int) else entry
 
-    def reset(self) -> None:
-        """Return to the state before the first tick."""
-        self.covariance = self._initial.copy()
-        # Twice as long as needed: a full buffer moves its newest half to the front, so that history is one slice.
-        self._history, self._lengths, self._newest = np.zeros((2 * HISTORY, len(self.noise))), np.zeros(2 * HISTORY), 0
-        self.ticks.reset()
-        self._covariance_stamp, self._capture = -1, None
+    def variance(self, index: int) -> ca.SX:
+        """Variance of one entry now, with its own process noise since the last correction."""
+        return self.covariance[index, index] + ca.fmin(self._age, LONGEST_GROWTH) * self.noise[index]
 
-    @property
-    def state(self) -> np.ndarray:
-        """The state now, (n,): the newest entry of the history itself."""
-        return self._history[self._newest]
+    def variance_of(self, entry: int | ca.SX) -> ca.SX:
+        """Variance of one entry at the last capture."""
+        row = self._row(entry)
+        return ca.dot(row, self.covariance @ row)
 
-    def remember(self, stamp_ns: int, state: Sequence[float] | np.ndarray, dt: float) -> None:
-        """Store a state that the caller has advanced by one tick of ``dt`` [s]."""
-        self.ticks.add(stamp_ns)
-        self._capture = None
-        if self._newest == 2 * HISTORY - 1:
-            self._history[:HISTORY], self._lengths[:HISTORY] = self._history[HISTORY:], self._lengths[HISTORY:]
-            self._newest = HISTORY - 1
-        self._newest += 1
-        self._history[self._newest] = state
-        self._lengths[self._newest] = dt
+    def _set(self, covariance: ca.SX) -> None:
+        self.covariance = ca.tril2symm(ca.tril(covariance))
 
-    def at(self, stamp_ns: int) -> np.ndarray | None:
-        """State at the tick nearest to a stamp, (n,): the history itself; None if it is not remembered."""
-        age = self.ticks.age(stamp_ns)
-        return None if age is None else self._history[self._newest - age]
+    def go_to(self, condition: ca.SX, age: ca.SX) -> None:
+        """Propagate the covariance to a time ``age`` [s] ago, if a condition holds and that is later."""
+        dt = where(both(condition, self._started), ca.fmax(ca.fmin(self._age - age, LONGEST_GROWTH), 0.0), 0.0)
 
-    def variance(self, index: int, stamp_ns: int) -> float:
-        """Variance of one entry at a stamp after the last correction, with its own process noise."""
-        since = (stamp_ns - self._covariance_stamp) * 1e-9 if self._covariance_stamp >= 0 else 0.0
-        return self.covariance.item(index, index) + min(since, LONGEST_GROWTH) * self.noise.item(index, index)
+        def moved(matrix: ca.SX) -> ca.SX:
+            return matrix + self._chain @ (dt * matrix + 0.5 * dt * dt * (self._chain @ matrix))
 
-    def restart(self) -> None:
-        """Covariance of the start, so that no gate refuses the next measurements; the state stays."""
-        self.covariance = self._initial.copy()
+        self._set(moved(moved(self.covariance).T) + dt * ca.diag(ca.vertcat(*self.noise)))
+        self._age = where(condition, where(self._started, ca.fmin(self._age, age), age), self._age)
+        self._started = where(condition, 1.0, self._started)
 
-    def set_entry(self, index: int, value: float, std: float) -> None:
-        """Set one state entry now and in the past, uncorrelated with the rest (a new line, a first distance)."""
-        self._history[:, index] = value
-        self.covariance[index, :] = self.covariance[:, index] = 0.0
-        self.covariance[index, index] = std * std
+    def within(self, entry: int | ca.SX, innovation: ca.SX, variance: Number, gate: float) -> ca.SX:
+        """Whether an innovation lies within so many standard deviations."""
+        return innovation**2 <= gate**2 * (self.variance_of(entry) + variance)
 
-    def set_path(self, index: int, value: float, stamp_ns: int, rates: np.ndarray, std: float) -> None:
-        """Set one entry at a past stamp, and along the remembered motion of the other entries where it differs.
+    def correct(self, condition: ca.SX, entry: int | ca.SX, innovation: ca.SX, variance: Number) -> ca.SX:
+        """Correct with an innovation of one entry; the change of the state at the capture, (n,)."""
+        row = self._row(entry)
+        column = self.covariance @ row
+        weight = where(condition, 1.0 / (ca.dot(row, column) + variance), 0.0)
+        self._set(self.covariance - weight * column @ column.T)
+        return weight * innovation * column
 
-        Args:
-            index: The entry.
-            value: Its value at the stamp.
-            stamp_ns: Time of capture.
-            rates: Entry per unit of the others, (n,): it moved by ``rates @ (x(t) - x(stamp))``.
-            std: Standard deviation.
-        """
-        past = self.at(stamp_ns)
-        path = 0.0 if past is None else (self._history - past) @ rates
-        self.set_entry(index, value, std)
-        self._history[:, index] += path
+    def correct_first_two(
+        self, condition: ca.SX, innovation: ca.SX, covariance: ca.SX, gate: float
+    ) -> tuple[ca.SX, ca.SX]:
+        """Correct with innovations of the first two entries, (2,), and their covariance, (2, 2).
 
-    def correct_entry(
-        self, stamp_ns: int, index: int, value: float, variance: float, gate: float | None = None
-    ) -> bool:
-        """Correct with one measured entry of the state.
-
-        Args:
-            stamp_ns: Time of capture.
-            index: The entry.
-            value: Its measured value.
-            variance: Of the value.
-            gate: Innovations beyond this many standard deviations are refused; None: the filter's own.
+        ``gate`` bounds their Mahalanobis distance over the square root of two.
 
         Returns:
-            False if the stamp is not in the history or the innovation is beyond the gate.
+            Whether they are within the gate, and the change of the state at the capture, (n,).
         """
-        capture = self._go_to(stamp_ns)
-        if capture is None:
-            return False
-        column = self.covariance[:, index]
-        innovation, spread = value - capture.states[0, index], column[index] + variance
-        if innovation * innovation > (gate or self._gate) ** 2 * spread:
-            return False
-        scaled = column / math.sqrt(spread)
-        self._apply(capture, innovation / spread * column, scaled[:, None] * scaled)
-        return True
+        columns = self.covariance[:, :2]
+        (a, b), (_, c) = (ca.horzsplit(row) for row in ca.vertsplit(columns[:2, :] + covariance))
+        weight = ca.blockcat([[c, -b], [-b, a]]) / (a * c - b * b)
+        accepted = both(condition, ca.bilin(weight, innovation, innovation) <= 2.0 * gate**2)
+        gain = columns @ where(accepted, weight, 0.0)
+        self._set(self.covariance - gain @ columns.T)
+        return accepted, gain @ innovation
 
-    def correct_pair(
-        self, stamp_ns: int, first: int, values: np.ndarray, covariance: np.ndarray, gate: float | None = None
-    ) -> bool:
-        """Correct with two neighbouring entries, as `correct_entry`.
+    def growth(self, change: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """G dx and G^2 dx of a change dx, (n,) each."""
+        first = self._chain @ change
+        return first, self._chain @ first
 
-        Args:
-            stamp_ns: Time of capture.
-            first: Index of the first one.
-            values: Measured values, (2,).
-            covariance: Of the values, (2, 2).
-            gate: As in `correct_entry`, for the innovation's Mahalanobis distance over the square root of two.
-        """
-        capture = self._go_to(stamp_ns)
-        if capture is None:
-            return False
-        both = slice(first, first + 2)
-        columns, innovation = self.covariance[:, both], values - capture.states[0, both]
-        (a, b), (_, c) = (columns[both] + covariance).tolist()
-        weight = np.array(((c, -b), (-b, a))) / (a * c - b * b)
-        if innovation @ weight @ innovation > 2.0 * (gate or self._gate) ** 2:
-            return False
-        gain = columns @ weight
-        self._apply(capture, gain @ innovation, gain @ columns.T)
-        return True
+    def set_entry(self, condition: ca.SX, entry: int | ca.SX, std: Number) -> None:
+        """Standard deviation of an entry that is set, uncorrelated with the others."""
+        chosen = condition * self._row(entry)
+        keep = 1.0 - ca.densify(chosen)
+        self._set(self.covariance * (keep @ keep.T) + std * std * ca.diag(chosen))
 
-    def _go_to(self, stamp_ns: int) -> _Capture | None:
-        """Propagate the covariance to a stamp; None if the stamp is not remembered."""
-        if self._capture is None or self._capture.stamp_ns != stamp_ns:
-            age = self.ticks.age(stamp_ns)
-            if age is None:
-                return None
-            past, newest = self._newest - age, self._newest
-            self._capture = _Capture(stamp_ns, self._history[past : newest + 1], self._lengths[past + 1 : newest + 1])
-            self._propagate(stamp_ns)
-        return self._capture
+    def raise_variance(self, entry: ca.SX, least: ca.SX) -> None:
+        """Variance of an entry to a least one."""
+        more = ca.fmax(least - self.variance_of(entry), 0.0)
+        self._set(self.covariance + more * ca.diag(entry))
 
-    def _propagate(self, stamp_ns: int) -> None:
-        if 0 <= self._covariance_stamp < stamp_ns:
-            dt = min((stamp_ns - self._covariance_stamp) * 1e-9, LONGEST_GROWTH)
-            step = dt * self.chain
-            transition = self._identity + step + 0.5 * step @ step
-            grown = transition @ self.covariance @ transition.T
-            self.covariance = 0.5 * (grown + grown.T) + dt * self.noise
-        self._covariance_stamp = max(stamp_ns, self._covariance_stamp)
+    def restart(self, condition: ca.SX, std: Sequence[float]) -> None:
+        """Uncorrelated entries with these standard deviations."""
+        self.covariance = where(condition, ca.SX(ca.DM(np.diag(np.square(std)))), self.covariance)
 
-    def _apply(self, capture: _Capture, correction: np.ndarray, reduction: np.ndarray) -> None:
-        """Add a correction of the captured state to every state since, and reduce the covariance."""
-        self.covariance -= reduction
-        first = self.chain @ correction
-        capture.states += capture.growth @ np.array((correction, first, self.chain @ first))
-
-
-class _Capture:
-    """The ticks since a capture.
-
-    Attributes:
-        stamp_ns: Time of capture.
-        states: States of the captured tick and of every later one, (age + 1, n): a part of the history itself.
-        growth: Factors of dx, G dx and G^2 dx at these ticks, (age + 1, 3) [1, s, s^2].
-    """
-
-    def __init__(self, stamp_ns: int, states: np.ndarray, lengths: np.ndarray) -> None:
-        self.stamp_ns, self.states = stamp_ns, states
-        once = twice = 0.0
-        factors = [(1.0, once, twice)]
-        for length in lengths.tolist():
-            once, twice = once + length, twice + length * once
-            factors.append((1.0, once, twice))
-        self.growth = np.array(factors)
+    def store(self) -> None:
+        """Remember covariance and its time for the next call."""
+        self._signals.remember(f"{self._name}.covariance", ca.tril(self.covariance).nz[:])
+        self._signals.remember(f"{self._name}.covariance_age", self._age)
+        self._signals.remember(f"{self._name}.corrected", self._started)

@@ -1,165 +1,195 @@
-"""Lines on the wall tracked from frame to frame: start, correction, fading and end of a track."""
+"""Correction of one tracked line: noise, offset and angle of a line on the wall, as noisy as its frames show."""
 
 from __future__ import annotations
 
-import math
+from typing import NamedTuple
 
-import numpy as np
+import casadi as ca
 
 from ibvs_qp.config import EstimationConfig
-from ibvs_qp.estimation.kalman import DelayedKalman
-from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
-from ibvs_qp.estimation.tracked_line import TrackedLine
+from ibvs_qp.estimation.kalman import LateKalman
+from ibvs_qp.estimation.noise import WhiteNoise
 from ibvs_qp.estimation.wall_lines import MeasuredLine
-from ibvs_qp.measurement import LineFeature
+from ibvs_qp.symbolic.logic import both, either, no, where
+from ibvs_qp.symbolic.signals import Signals
 
-#: Lines tracked at once, and where their offsets begin in the filter's state (after velocity, bias and odometer).
+#: Lines tracked at once, and where their offsets begin in the state of the motion: after velocity, bias and odometer.
 SLOTS, LINES = 8, 6
-#: Standard deviation of an unused entry of the filter [m].
-UNUSED_STD = 0.05
 
 
-class LineTracks:
-    """The tracked lines; their offsets are entries of the filter of the motion in the wall plane.
+class LineRecord(NamedTuple):
+    """What is remembered of a line."""
 
-    Attributes:
-        lines: The lines by identity.
-        seen_ns: Capture of the last frame of which a line was accepted, -1 before the first.
+    variance: ca.SX  # noise of the offset (`WhiteNoise`) [m^2]
+    samples: ca.SX
+    residual: ca.SX
+    angle: ca.SX  # filtered [rad]; the angle hardly changes
+    spread: ca.SX  # its variance [rad^2]
+    angle_variance: ca.SX  # noise of the angle [rad^2]
+    angle_samples: ca.SX
+    angle_residual: ca.SX
+    frames: ca.SX  # that showed the line
+    refused: ca.SX  # refused offsets in a row that agree with each other
+    right: ca.SX  # change of the offset per metre of tip motion to the right [-]
+    down: ca.SX  # and down [-]
+    walk: ca.SX  # spectral density of the offset's random walk [m^2/s]
+
+
+class LineInput(NamedTuple):
+    """One line of a frame."""
+
+    known: ca.SX  # whether there is one
+    slot: ca.SX  # its place, a vector with a one, (SLOTS,)
+    new: ca.SX  # whether its track starts
+    seen_s: ca.SX  # time since the frame that showed it before [s]
+    variance: ca.SX  # of rho
+    paint: ca.SX  # whether it is a painted edge
+    measured: MeasuredLine  # on the wall
+
+
+class LineCorrection(NamedTuple):
+    """Result for one line."""
+
+    accepted: ca.SX  # whether the line starts or is corrected
+    ends: ca.SX  # whether its track ends, because another line stays in its place
+    change: ca.SX  # of the state of the motion at the capture
+    record: LineRecord
+    deviation: ca.SX  # of the offset [m]
+
+
+class LineRecords:
+    """Records of all slots, and the noise of all lines, which is the prior of a new one."""
+
+    def __init__(self, signals: Signals) -> None:
+        self._signals = signals
+        count = len(LineRecord._fields)
+        self._records = ca.reshape(signals.state("lines.records", count * SLOTS), count, SLOTS)
+        self.offset_noise, self.angle_noise = (
+            WhiteNoise(signals.state(f"lines.{name}_variance"), signals.state(f"lines.{name}_samples"), ca.SX(0.0))
+            for name in ("offset", "angle")
+        )
+
+    @property
+    def rates(self) -> ca.SX:
+        """Change of every offset per metre of tip motion to the right and down, (SLOTS, 2)."""
+        first = LineRecord._fields.index("right")
+        return self._records[first : first + 2, :].T
+
+    @property
+    def walks(self) -> list[ca.SX]:
+        """Spectral densities of the offsets' random walks [m^2/s]."""
+        return ca.horzsplit(self._records[LineRecord._fields.index("walk"), :])
+
+    def at(self, slot: ca.SX) -> LineRecord:
+        """Record of one slot, given as a vector with a one."""
+        return LineRecord(*ca.vertsplit(self._records @ slot))
+
+    def store(self, slot: ca.SX, record: LineRecord) -> None:
+        """Remember a record, and the noise of all lines."""
+        new = ca.vertcat(*record)
+        columns = [
+            where(here, new, old) for here, old in zip(ca.vertsplit(slot), ca.horzsplit(self._records), strict=True)
+        ]
+        self._signals.remember("lines.records", ca.vertcat(*columns))
+        for name, noise in (("offset", self.offset_noise), ("angle", self.angle_noise)):
+            self._signals.remember(f"lines.{name}_variance", noise.variance)
+            self._signals.remember(f"lines.{name}_samples", noise.samples)
+
+
+def correct_line(
+    records: LineRecords,
+    kalman: LateKalman,
+    config: EstimationConfig,
+    line: LineInput,
+    past: ca.SX,
+    age: ca.SX,
+    other: ca.SX,
+) -> LineCorrection:
+    """Correct the filter of the motion with one line, or start its track.
 
     Args:
-        motion: Filter whose state ends with `SLOTS` offsets; entries 0 and 1 are the velocity, 4 and 5 the odometer.
-        config: Noise models and life times.
+        records: Records of all lines.
+        kalman: Filter of the motion in the wall plane.
+        config: Noise models and bounds.
+        line: The line.
+        past: State at its capture; its own offset there counts once the track has started.
+        age: Time since the capture [s].
+        other: Whether there is another measurement of that time instead of the line.
     """
+    measured, old = line.measured, records.at(line.slot)
+    entry = ca.vertcat(ca.SX.zeros(LINES), line.slot)
+    known = both(line.known, measured.known)
+    tracked, starts = both(known, no(line.new)), both(known, line.new)
+    claimed = config.line_std_m**2 + ca.fmax(line.variance, 0.0) * measured.scale**2
 
-    def __init__(self, motion: DelayedKalman, config: EstimationConfig) -> None:
-        self._filter, self._config = motion, config
-        self.reset()
+    noise = WhiteNoise(old.variance, old.samples, old.residual)
+    innovation = measured.offset - ca.dot(entry, past)
+    difference = innovation - noise.residual
+    sample = noise.sample(difference, claimed)
+    prior = records.offset_noise.like(measured.scale**2)
+    records.offset_noise = records.offset_noise.averaged(sample / measured.scale**2, tracked)
+    noise = noise.averaged(sample)
+    variance = noise.total(claimed)
+    # Never below the variance of the mean: the first frames get no more confidence than they deserve.
+    least = variance / ca.fmax(old.frames, 1.0)
+    kalman.raise_variance(entry, where(tracked, least, 0.0))
+    kalman.go_to(either(tracked, other), age)
+    accepted = both(tracked, kalman.within(entry, innovation, variance, config.gate_sigmas))
+    change = kalman.correct(accepted, entry, innovation, variance)
 
-    def reset(self) -> None:
-        """Drop every line."""
-        self.lines: dict[int, TrackedLine] = {}
-        self.seen_ns = -1
-        self._noise_rho, self._noise_theta = WhiteNoise(), WhiteNoise()  # of all lines: the prior of a new one
-        self._filter.chain[LINES:, :] = 0.0
-        for slot in range(SLOTS):
-            self._filter.set_entry(LINES + slot, 0.0, UNUSED_STD)
+    # The angle, a random walk. The fit's own variance is not used: on a short fresh edge it is three times too large.
+    tilt = WhiteNoise(old.angle_variance, old.angle_samples, old.angle_residual)
+    angle_prior, angle_claimed = records.angle_noise.like(), config.angle_std_rad**2
+    turn = measured.angle - old.angle
+    sample = tilt.sample(turn - tilt.residual, angle_claimed)
+    records.angle_noise = records.angle_noise.averaged(sample, accepted)
+    tilt = tilt.averaged(sample)
+    angle_noise = tilt.total(angle_claimed)
+    spread = ca.fmax(old.spread + config.angle_noise**2 * line.seen_s, angle_noise / ca.fmax(old.frames, 1.0))
+    gain = spread / (spread + angle_noise)
 
-    def advance(self, stamp_ns: int, state: list[float], right: float, down: float) -> None:
-        """Predict the offsets in the state of a new tick; fade and drop lines without new frames.
+    first_variance, passed = prior.total(claimed), either(starts, accepted)
+    kalman.set_entry(starts, entry, ca.sqrt(first_variance))
+    angle = where(starts, measured.angle, old.angle + gain * turn)
+    walk = where(line.paint, config.paint_noise**2, config.line_noise**2)  # a painted edge swings ahead of the brush
+    started = LineRecord(
+        variance=prior.variance,
+        samples=prior.samples,
+        residual=ca.SX(0.0),
+        angle=angle,
+        spread=angle_prior.total(angle_claimed),
+        angle_variance=angle_prior.variance,
+        angle_samples=angle_prior.samples,
+        angle_residual=ca.SX(0.0),
+        frames=ca.SX(1.0),
+        refused=ca.SX(0.0),
+        right=-ca.cos(angle),
+        down=-ca.sin(angle),
+        walk=walk,
+    )
+    corrected = started._replace(
+        variance=noise.variance,
+        samples=noise.samples,
+        residual=innovation - ca.dot(entry, change),
+        spread=spread * (1.0 - gain),
+        angle_variance=tilt.variance,
+        angle_samples=tilt.samples,
+        angle_residual=(1.0 - gain) * turn,
+        frames=old.frames + 1.0,
+    )
+    refused = old._replace(
+        variance=noise.variance,
+        samples=noise.samples,
+        residual=innovation,
+        # New noise scatters, so its offsets are only refused until it is learned. Those of another line agree.
+        refused=where(difference * difference < 2.0 * config.gate_sigmas**2 * variance, old.refused + 1.0, 1.0),
+    )
+    record = _choose(starts, started, _choose(accepted, corrected, _choose(tracked, refused, old)))
+    records.store(line.slot, record)
+    deviation = ca.sqrt(where(starts, first_variance, kalman.variance_of(entry)))
+    ends = both(tracked, no(accepted), record.refused >= config.refused_frames)
+    return LineCorrection(passed, ends, change, record, deviation)
 
-        ``state`` holds the offsets of the last tick and is advanced in place by the path of the tip right and down [m].
-        """
-        start, end, old = self._config.fade_start_s, self._config.fade_end_s, []
-        for line in self.lines.values():
-            entry, (per_right, per_down) = LINES + line.slot, line.rates
-            state[entry] += per_right * right + per_down * down
-            line.offset, line.weight = state[entry], line.fresh_weight
-            age = (stamp_ns - line.news_ns) * 1e-9
-            if age > end:
-                old.append(line)
-            elif age > start:
-                line.weight *= (end - age) / (end - start)
-        for line in old:
-            state[LINES + line.slot] = 0.0
-            self._drop(line)
 
-    def correct(self, line: LineFeature, measured: MeasuredLine, stamp: int, tick_ns: int) -> None:
-        """Correct or start the track of a line in the image, measured on the wall at a time of capture.
-
-        ``tick_ns`` is the time of the tick at which the frame arrived.
-        """
-        variance = self._config.line_std_m**2 + max(float(line.covariance[0, 0]), 0.0) * measured.scale**2
-        track = self.lines.get(line.track_id)
-        if track is None:
-            track = self._start(line, measured, variance, stamp)
-            if track is None:
-                return
-        elif track.seen_ns != stamp and not self._correct_offset(track, measured, variance, stamp):
-            return
-        else:
-            self._correct_angle(track, measured.angle, stamp)
-        if track.seen_ns != stamp:
-            track.frames += 1
-        track.seen_ns, track.news_ns = stamp, tick_ns
-        self.seen_ns = max(self.seen_ns, stamp)
-        track.fresh_weight = min(1.0, track.frames / self._config.frames_to_trust) * line.weight
-        track.surface_side, track.kind = measured.surface_side, line.kind or track.kind
-        # A painted edge grows behind the brush and swings ahead of it: its offset says little of the velocity.
-        walk = self._config.paint_noise if track.kind == "paint" else self._config.line_noise
-        self._filter.noise[LINES + track.slot, LINES + track.slot] = walk**2
-        track.seen_angle, track.middle, track.length = measured.angle, measured.middle, measured.length
-        self._couple(track)
-
-    def _correct_offset(self, track: TrackedLine, measured: MeasuredLine, claimed: float, stamp: int) -> bool:
-        """Correct with one offset, as noisy as the line's frames show; False if it is refused."""
-        entry, past, noise = LINES + track.slot, self._filter.at(stamp), track.noise
-        if past is None:
-            return False
-        innovation = measured.offset - float(past[entry])
-        difference = innovation - noise.residual
-        sample = noise.learn(difference, claimed)
-        self._noise_rho.average(sample / measured.scale**2)
-        variance = noise.total(claimed)
-        covariance = self._filter.covariance
-        covariance[entry, entry] = max(covariance[entry, entry], variance / track.frames)  # as in SteadyValue
-        if not self._filter.correct_entry(stamp, entry, measured.offset, variance):
-            noise.residual = innovation
-            self._refuse(track, difference, variance)
-            return False
-        noise.residual = measured.offset - float(past[entry])  # `past` is corrected by now
-        track.deviation = math.sqrt(self._filter.covariance[entry, entry])
-        track.refused = 0
-        return True
-
-    def _refuse(self, track: TrackedLine, difference: float, variance: float) -> None:
-        """Drop the track once several refused offsets in a row agree with each other: it is another line then.
-
-        New noise scatters: its offsets do not agree and are only refused until it is learned. ``difference`` is
-        between the residuals of this frame and the last [m].
-        """
-        agrees = difference * difference < 2.0 * self._config.gate_sigmas**2 * variance
-        track.refused = track.refused + 1 if agrees else 1
-        if track.refused >= self._config.refused_frames:
-            self._drop(track)
-
-    def _correct_angle(self, track: TrackedLine, angle: float, stamp: int) -> None:
-        # The fit's own variance is not used: on a short fresh edge it is three times too large.
-        walk = self._config.angle_noise**2 * (stamp - track.seen_ns) * 1e-9
-        self._noise_theta.average(track.tilt.correct(angle, self._config.angle_std_rad**2, walk))
-        track.angle, track.theta_variance = track.tilt.value, track.tilt.spread
-
-    def _start(self, line: LineFeature, measured: MeasuredLine, variance: float, stamp: int) -> TrackedLine | None:
-        """A new track from the first frame of a line; None if all slots are taken."""
-        free = set(range(SLOTS)) - {track.slot for track in self.lines.values()}
-        if not free:
-            return None
-        noise, angle_noise = WhiteNoise.like(self._noise_rho, measured.scale**2), WhiteNoise.like(self._noise_theta)
-        spread = angle_noise.total(self._config.angle_std_rad**2)
-        track = TrackedLine(
-            track_id=line.track_id,
-            role=line.role,
-            slot=min(free),
-            angle=measured.angle,
-            deviation=math.sqrt(noise.total(variance)),
-            seen_ns=stamp,
-            noise=noise,
-            tilt=SteadyValue(value=measured.angle, spread=spread, noise=angle_noise),
-        )
-        self.lines[line.track_id] = track
-        self._couple(track)
-        rates = np.zeros(LINES + SLOTS)
-        rates[4:6] = track.rates
-        self._filter.set_path(LINES + track.slot, measured.offset, stamp, rates, track.deviation)
-        track.offset = float(self._filter.state[LINES + track.slot])
-        return track
-
-    def _couple(self, track: TrackedLine) -> None:
-        """Couple the offset to the velocity: it falls as the tip moves along the line's normal."""
-        track.rates = -math.cos(track.angle), -math.sin(track.angle)
-        self._filter.chain[LINES + track.slot, 0:2] = track.rates
-
-    def _drop(self, track: TrackedLine) -> None:
-        entry = LINES + track.slot
-        del self.lines[track.track_id]
-        self._filter.chain[entry, :] = 0.0
-        self._filter.set_entry(entry, 0.0, UNUSED_STD)
+def _choose(condition: ca.SX, then: LineRecord, otherwise: LineRecord) -> LineRecord:
+    return LineRecord(*(where(condition, first, other) for first, other in zip(then, otherwise, strict=True)))

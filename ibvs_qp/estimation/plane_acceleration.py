@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
 
 from ibvs_qp.config import EstimationConfig
 from ibvs_qp.estimation.push_disturbance import SLOW_CHANGE, filter_gain, gust_weight
-from ibvs_qp.symbolic.function import StepFunction
 from ibvs_qp.symbolic.logic import both, where
 from ibvs_qp.symbolic.signals import Signals
 
@@ -110,56 +108,3 @@ def _noise_density(signals: Signals, across: ca.SX, dt: ca.SX, time_s: float) ->
     shaken = ca.sumsqr(twice - low_passed("noise_slow", twice, NOISE_LOW)) / 2.0
     power = signals.state("plane.noise_power")
     return signals.remember("plane.noise_power", power + filter_gain(1.0 / time_s, dt) * (shaken - power)) / NOISE_POWER
-
-
-class PlaneAcceleration:
-    """The same on plain numbers.
-
-    Attributes:
-        force: Specific force in B [m/s^2], (3,).
-        density: Its noise in the wall plane [m^2/s^3].
-
-    Args:
-        config: Averaging time of the noise, and the changes at which w is one half.
-        delay_s: Age of a force sample [s].
-        compiled: Whether it runs as machine code.
-    """
-
-    def __init__(self, config: EstimationConfig, delay_s: float, compiled: bool = False) -> None:
-        signals = Signals()
-        found = plane_force(
-            signals,
-            config,
-            dt=signals.input("dt"),
-            measured=signals.input("measured", 3),
-            motors=signals.input("motors", 3),
-            contact=signals.input("contact", 3),
-            delay_s=delay_s,
-            normal=signals.input("normal", 3),
-            use_model=signals.input("use_model"),
-        )
-        signals.output("force", found.force)
-        signals.output("density", found.density)
-        self._step = StepFunction(signals, to_machine_code=compiled)
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to the state before the first tick."""
-        self._step.reset()
-        self.force, self.density = [0.0, 0.0, 0.0], 0.0
-
-    def update(
-        self,
-        dt: float,
-        measured: Sequence[float],
-        motors: Sequence[float],
-        contact: Sequence[float],
-        normal: Sequence[float],
-        use_model: bool,
-    ) -> list[float]:
-        """Specific force of a tick; arguments as of `plane_force`."""
-        self._step.advance()
-        self._step.values[:] = dt, *measured, *motors, *contact, *normal, use_model
-        self._step.evaluate()
-        *self.force, self.density = self._step.results.tolist()
-        return self.force

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-
-from ibvs_qp.estimation.line_noise import SteadyValue, WhiteNoise
+from dataclasses import dataclass
 
 
 @dataclass(slots=True)
@@ -25,11 +23,9 @@ class TrackedLine:
         weight: Its weight now; fresh_weight: its weight at the last frame.
         surface_side, kind: As in `ibvs_qp.measurement.LineFeature`.
         theta_variance: Of the filtered angle [rad^2].
-        rates: Change of the offset per metre of tip motion (right, down).
-        noise: Noise of the measured offset [m^2]; tilt: filter of the angle.
-        refused: Refused offsets in a row that agree with each other.
+        residual: Innovation of the last measured offset that its correction left [m].
         seen_angle, middle, length: Angle [rad], middle and length [m] of the visible piece in the last frame, as in
-            `ibvs_qp.estimation.wall_lines.MeasuredLine`.
+            `ibvs_qp.estimation.wall_lines.MeasuredLine`; NaN and 0 without end points.
     """
 
     track_id: int
@@ -46,10 +42,7 @@ class TrackedLine:
     surface_side: int = 0
     kind: str = ""
     theta_variance: float = 1e-4
-    rates: tuple[float, float] = (0.0, 0.0)
-    noise: WhiteNoise = field(default_factory=WhiteNoise)
-    tilt: SteadyValue = field(default_factory=SteadyValue)
-    refused: int = 0
+    residual: float = 0.0
     seen_angle: float = math.nan
     middle: float = math.nan
     length: float = 0.0
@@ -57,4 +50,4 @@ class TrackedLine:
     @property
     def seen_offset(self) -> float:
         """Offset that the last frame shows, moved to now [m]; `offset` is filtered."""
-        return self.offset + self.noise.residual
+        return self.offset + self.residual

@@ -13,16 +13,17 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.late_kalman import LateKalman
+from ibvs_qp.estimation.kalman import LateKalman
 from ibvs_qp.estimation.motion_history import MotionHistory
-from ibvs_qp.estimation.normal_turns import mirrored_normal
-from ibvs_qp.estimation.vibration import noise_density, vibration_variance
+from ibvs_qp.estimation.noise import noise_density, vibration_variance
 from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
 from ibvs_qp.symbolic.logic import both, either, no, where, wrapped
 from ibvs_qp.symbolic.signals import Signals
 
-#: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias.
+#: Order of the filter's state: distance [m], speed of the centre of mass into the wall [m/s], accelerometer bias; and
+#: its chain: the state grows by it and the measured acceleration.
 DISTANCE, SPEED, BIAS = 0, 1, 2
+CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
 #: Spectral density of the distance itself [m^2/s]: nearly none.
 DISTANCE_NOISE = 1e-10
 #: Standard deviations at the start: distance [m], speed [m/s], bias [m/s^2]; and of the first measured distance [m].
@@ -38,6 +39,11 @@ TOUCH_STD = 0.003
 JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
 #: Age of a plane that never came [s], and distance of a wall that was never seen [m].
 NEVER_S, FAR_AWAY = 1e6, 1e3
+#: Turns are compared over this time [s], and judged once the gyro's have this root sum of squares [rad]: five times
+#: the noise of a turn by two normals of 0.6 deg each over the threshold's distance from a right sign.
+TURN_S, LEAST_TURN = 0.25, math.radians(3.0)
+#: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 mirrored.
+OPPOSED = -0.5
 
 
 class Tick(NamedTuple):
@@ -93,7 +99,7 @@ class WallDistance:
         self.anew = signals.state("wall.anew")
         self.since_plane = signals.state("wall.since_plane", start=NEVER_S) + tick.elapsed
         self._gap = either(signals.state("wall.gap"), tick.elapsed > GAP_S, tick.doubt)
-        self._kalman = LateKalman(signals, INITIAL_STD, tick.elapsed)
+        self._kalman = LateKalman(signals, "wall", CHAIN, INITIAL_STD, tick.elapsed)
         self.accepted = ca.SX(0.0)
         self._predict(config.tick_s, settings.acceleration_filter_s)
 
@@ -220,12 +226,13 @@ class WallDistance:
 
         variance = where(within, deviation**2, settings.outlier_std_m**2)
         innovation = ca.vertcat(distance, -self.lever_speed) - past[:2]
-        at_capture, now = kalman.correct(either(within, counts_little), DISTANCE, innovation[DISTANCE], variance, age)
+        at_capture = kalman.correct(either(within, counts_little), DISTANCE, innovation[DISTANCE], variance)
         # The tip stands: so does the body, but for its rotation.
         slip, speed_variance = innovation[SPEED] - at_capture[SPEED], settings.stationary_speed_std_m_s**2
         stands = both(within, tip_stationary, kalman.within(SPEED, slip, speed_variance, settings.gate_sigmas))
-        _, further = kalman.correct(stands, SPEED, slip, speed_variance, age)
-        self._state = self._state + now + further
+        change = at_capture + kalman.correct(stands, SPEED, slip, speed_variance)
+        first, second = kalman.growth(change)
+        self._state = self._state + change + age * first + 0.5 * age**2 * second
         # A filter that refuses for long has a wrong speed as well: both from the refused planes.
         interval = ca.fmax(first_age - age, SHORTEST_JUMPS)
         kalman.restart(restart, (FIRST_DISTANCE_STD, JUMP_SPEED_STD, INITIAL_STD[BIAS]))
@@ -300,3 +307,37 @@ class WallDistance:
     def depth(self) -> ca.SX:
         """Camera to wall along the normal [m], about `FAR_AWAY` while unknown."""
         return self.distance + ca.dot(self.normal, self._tip_from_camera)
+
+
+def mirrored_normal(signals: Signals, new: ca.SX, since_last: ca.SX, normal: ca.SX, yaw: ca.SX) -> ca.SX:
+    """Whether the normal turns against the vehicle's yaw; following it would turn the vehicle to the wall's side.
+
+    Args:
+        signals: Registry.
+        new: Whether a normal was measured in this tick.
+        since_last: Time from the capture of the last measured normal to this one's [s].
+        normal: The normal in B, (3,).
+        yaw: Integrated yaw at its capture [rad].
+    """
+    names = ("started", "time", "seen", "yaw", "square", "product", "found")
+    started, time, first, begun, square, product, found = (signals.state(f"turns.{name}") for name in names)
+    seen = -ca.atan2(normal[1], normal[0])  # the wall turns the other way in B
+    time = where(started, time + since_last, 0.0)
+    due = both(new, started, time >= TURN_S)
+    felt, turned = wrapped(yaw - begun), wrapped(seen - first)
+    square, product = square + where(due, felt * felt, 0.0), product + where(due, felt * turned, 0.0)
+    judged = both(due, square >= LEAST_TURN**2)
+    found = either(found, both(judged, product < OPPOSED * square))
+    begins = both(new, either(no(started), due))
+    kept = {
+        "started": either(started, new),
+        "time": where(begins, 0.0, where(new, time, signals.state("turns.time"))),
+        "seen": where(begins, seen, first),
+        "yaw": where(begins, yaw, begun),
+        "square": where(judged, 0.0, square),
+        "product": where(judged, 0.0, product),
+        "found": found,
+    }
+    for name, value in kept.items():
+        signals.remember(f"turns.{name}", value)
+    return found

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from ibvs_qp.frames import Vector3, add_scaled, cross, dot
-from ibvs_qp.measurement import HORIZONTAL, LineFeature
+import casadi as ca
+
+from ibvs_qp.frames import add_scaled, cross, dot
+from ibvs_qp.symbolic.logic import both, where
 
 #: A wall whose normal is this close to gravity's direction is a floor and has no level direction of its own.
 LEAST_CROSS = 1e-6
@@ -17,93 +20,93 @@ LEAST_IN_PLANE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class WallAxes:
-    """Unit vectors in B: normal into the wall, right and down in the wall plane, and gravity."""
+    """Unit vectors in B, of numbers or of symbols: normal into the wall, right and down in its plane, and gravity."""
 
-    normal: Sequence[float]
-    right: Vector3
-    down: Vector3
-    gravity: Sequence[float]
+    normal: Any
+    right: Any
+    down: Any
+    gravity: Any
 
     @classmethod
-    def of(cls, normal: Sequence[float], gravity: Sequence[float]) -> WallAxes:
-        """Axes of a wall with a given normal, under a given direction of gravity."""
+    def of(cls, normal: Sequence[Any], gravity: Sequence[Any]) -> WallAxes:
+        """Axes of a wall by its normal and the direction of gravity: right is level, down completes it."""
         across = cross(gravity, normal)
-        length = max(math.sqrt(dot(across, across)), LEAST_CROSS)
+        length = ca.fmax(ca.sqrt(dot(across, across)), LEAST_CROSS)
         right = across[0] / length, across[1] / length, across[2] / length
         return cls(normal, right, cross(normal, right), gravity)
 
+    @classmethod
+    def of_symbols(cls, normal: ca.SX, gravity: ca.SX) -> WallAxes:
+        """The same of vectors of symbols, (3,) each."""
+        axes = cls.of(ca.vertsplit(normal), ca.vertsplit(gravity))
+        return cls(normal, ca.vertcat(*axes.right), ca.vertcat(*axes.down), gravity)
 
-@dataclass(frozen=True, slots=True)
-class MeasuredLine:
-    """A line on the wall.
+    def in_body(self, right: ca.SX, down: ca.SX) -> ca.SX:
+        """A vector of the wall plane in B, (3,); axes of symbols."""
+        return right * self.right + down * self.down
 
-    Attributes:
-        offset: Signed distance from the tip's wall point along the normal [m].
-        angle: Angle of the normal in (right, down) [rad].
-        surface_side: As in `LineFeature`, for this normal.
-        scale: Metres per unit of rho.
-        middle: Middle of the visible piece along the line, from the foot of the tip's wall point towards the normal
-            turned from right to down by 90 degrees [m]; NaN without end points.
-        length: Length of that piece [m].
-    """
 
-    offset: float
-    angle: float
-    surface_side: int
-    scale: float
-    middle: float = math.nan
-    length: float = 0.0
+class MeasuredLine(NamedTuple):
+    """A line on the wall."""
+
+    known: ca.SX  # 0 where its interpretation plane is parallel to the wall
+    offset: ca.SX  # signed distance from the tip's wall point along the normal [m]
+    angle: ca.SX  # of the normal in (right, down) [rad]
+    sign: ca.SX  # -1 where that normal is opposite to that of the image line
+    scale: ca.SX  # metres per unit of rho
+    middle: ca.SX  # of the visible piece, from the foot of the tip's wall point along the normal turned by 90 deg [m]
+    length: ca.SX  # of that piece [m]; negative without end points
 
 
 def wall_line(
-    line: LineFeature, axes: WallAxes, tip_from_camera: Sequence[float], distance: float
-) -> MeasuredLine | None:
+    rho: ca.SX,
+    theta: ca.SX,
+    vertical: ca.SX,
+    ends: Sequence[Sequence[ca.SX]],
+    axes: WallAxes,
+    tip_from_camera: list[float],
+    distance: ca.SX,
+) -> MeasuredLine:
     r"""Image line on the wall.
 
     The line's interpretation plane has the normal h = (cos, sin, -rho) in C; with the tip's wall point P and the
-    in-plane part of h, the offset is :math:`-h \cdot P / |h_\parallel|`.
+    in-plane part of h, the offset is :math:`-h \cdot P / |h_\parallel|`. The normal points down, of a vertical line to
+    the right.
 
     Args:
-        line: Line at capture.
-        axes: Wall axes in B at capture.
+        rho: Of the line at capture [-].
+        theta: Of the line [rad].
+        vertical: Whether its role is vertical.
+        ends: End points of the visible piece, normalised.
+        axes: Wall axes in B at capture, of vectors.
         tip_from_camera: Tip relative to the camera in B [m], (3,).
         distance: Tip to wall [m].
-
-    Returns:
-        The line; None if its interpretation plane is parallel to the wall.
     """
-    h = -line.rho, math.cos(line.theta), math.sin(line.theta)  # in B: (front, right, down)
-    right, down = dot(h, axes.right), dot(h, axes.down)
-    length = math.hypot(right, down)
-    if length < LEAST_IN_PLANE:
-        return None
-    point = add_scaled(tip_from_camera, distance, axes.normal)
-    sign = 1.0 if (down if line.role == HORIZONTAL else right) >= 0.0 else -1.0
-    depth = dot(point, axes.normal)
-    ends = _along(line, axes, point, depth, (sign * right / length, sign * down / length))
+    h = ca.vertcat(-rho, ca.cos(theta), ca.sin(theta))  # in B: (front, right, down)
+    right, down = ca.dot(h, axes.right), ca.dot(h, axes.down)
+    length = ca.sqrt(right * right + down * down)
+    known = length >= LEAST_IN_PLANE
+    length = where(known, length, 1.0)
+    point = ca.DM(tip_from_camera) + distance * axes.normal
+    sign = where(where(vertical, right, down) >= 0.0, 1.0, -1.0)
+    depth, across = ca.dot(point, axes.normal), (sign * right / length, sign * down / length)
+    places, in_front = [], ca.SX(1.0)
+    for x, y in ends:
+        ray = ca.vertcat(1.0, x, y)
+        towards = ca.dot(ray, axes.normal)
+        away = depth / ca.fmax(towards, LEAST_IN_PLANE) * ray - point
+        places.append(across[0] * ca.dot(axes.down, away) - across[1] * ca.dot(axes.right, away))
+        in_front = both(in_front, towards >= LEAST_IN_PLANE)
+    first, last = places
     return MeasuredLine(
-        offset=-sign * dot(h, point) / length,
-        angle=math.atan2(sign * down, sign * right),
-        surface_side=int(sign) * line.surface_side,
+        known=known,
+        offset=-sign * ca.dot(h, point) / length,
+        angle=ca.atan2(sign * down, sign * right),
+        sign=sign,
         scale=depth / length,
-        middle=0.5 * sum(ends) if ends else math.nan,
-        length=abs(ends[1] - ends[0]) if ends else 0.0,
+        middle=0.5 * (first + last),
+        length=where(in_front, ca.fabs(last - first), -1.0),
     )
-
-
-def _along(line: LineFeature, axes: WallAxes, point: Vector3, depth: float, normal: tuple[float, float]) -> list[float]:
-    """Place of both ends of the visible piece along a line with that normal (right, down) [m]; [] without ends."""
-    if line.segment is None:
-        return []
-    places = []
-    for x, y in line.segment.tolist():
-        towards = axes.normal[0] + x * axes.normal[1] + y * axes.normal[2]
-        if towards < LEAST_IN_PLANE:
-            return []
-        ray = depth / towards
-        away = ray - point[0], ray * x - point[1], ray * y - point[2]
-        places.append(normal[0] * dot(axes.down, away) - normal[1] * dot(axes.right, away))
-    return places
 
 
 def image_line(

@@ -13,7 +13,7 @@ NO_LIMIT = 1e4
 
 
 class ThrustLimit(Limit):
-    """Each thrust within its box, and within the rate limit of the last one (`ibvs_qp.model.thrust_window`)."""
+    """Each thrust within its box, and within the rate limit of the last one (`ibvs_qp.model.reach`)."""
 
     bound_settings = ("vehicle.thrust_min_n", "vehicle.thrust_max_n", "vehicle.thrust_rate_n_s")
     switch_setting = "thrust_rows"

@@ -1,4 +1,4 @@
-"""Inputs of the law at the present, as symbols: body, contact, reference and lines.
+"""Inputs of the law at the present, as symbols: reference, lines and gains; body and contact are the estimators'.
 
 `ibvs_qp.model.tick` computes them from the sensors.
 """
@@ -16,98 +16,6 @@ from ibvs_qp.symbolic.signals import Signals
 
 #: Gain of an integral in the division that bounds it: one of zero has a bound as well.
 LEAST_GAIN = 1e-6
-
-
-@dataclass(frozen=True, kw_only=True)
-class Body:
-    """Inertial state and forces, in B.
-
-    Attributes:
-        dt: Time since the last step [s].
-        down: Unit gravity.
-        gyro: Angular velocity as measured [rad/s].
-        rate: Angular velocity [rad/s]: the gyro's, in a model the estimated one (`ibvs_qp.model.angular_rate`).
-        specific_force: Accelerometer [m/s^2]; specific_force_known: 1 if measured.
-        wrench: Tared contact wrench on the vehicle [N, N m].
-        velocity: Linear velocity [m/s]; velocity_known: 1 if estimated.
-        acceleration_bias: Measured minus true acceleration [m/s^2]; its part along the wall counts.
-    """
-
-    dt: ca.SX
-    down: ca.SX
-    gyro: ca.SX
-    rate: ca.SX
-    specific_force: ca.SX
-    specific_force_known: ca.SX
-    wrench: ca.SX
-    velocity: ca.SX
-    velocity_known: ca.SX
-    acceleration_bias: ca.SX
-
-    @classmethod
-    def of(cls, signals: Signals) -> Body:
-        """Declare the inputs."""
-        gyro = signals.input("angular_velocity", 3)
-        return cls(
-            dt=signals.input("dt"),
-            down=gravity_direction(signals.input("attitude", 4)),
-            gyro=gyro,
-            rate=gyro,
-            specific_force=signals.input("specific_force", 3),
-            specific_force_known=signals.input("specific_force_known"),
-            wrench=signals.input("contact_wrench", 6),
-            velocity=signals.input("velocity", 3),
-            velocity_known=signals.input("velocity_known"),
-            acceleration_bias=signals.input("acceleration_bias", 3),
-        )
-
-    def velocity_of(self, point: tuple[float, float, float]) -> ca.SX:
-        r"""Velocity of a point of the body, :math:`v + \Omega \times p` [m/s], (3,).
-
-        Args:
-            point: The point, in B [m].
-        """
-        return self.velocity + ca.cross(self.rate, ca.DM(point))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Contact:
-    """Wall and contact as estimated (`ibvs_qp.estimation.contact`).
-
-    Attributes:
-        known: 1 once the wall was seen.
-        distance: Tip to wall [m]; rate: its rate [m/s]; acceleration: its second derivative [m/s^2].
-        rate_noise: Standard deviation of the rate [m/s]; acceleration_noise: of an accelerometer sample [m/s^2].
-        bias: Measured minus true acceleration along n [m/s^2].
-        push: Filtered push [N]; push_noise: its standard deviation in free flight [N].
-        moment_noise: Standard deviation of the moments in free flight, as a force across the tip [N].
-        touching: 1 in contact.
-        ramp: 0 at touch to 1.
-        stiffness: [N/m]; stiffness_known: 1 once measured.
-        normal: Unit vector into the wall, in B.
-    """
-
-    known: ca.SX
-    distance: ca.SX
-    rate: ca.SX
-    acceleration: ca.SX
-    rate_noise: ca.SX
-    acceleration_noise: ca.SX
-    bias: ca.SX
-    push: ca.SX
-    push_noise: ca.SX
-    moment_noise: ca.SX
-    touching: ca.SX
-    ramp: ca.SX
-    stiffness: ca.SX
-    stiffness_known: ca.SX
-    normal: ca.SX
-
-    @classmethod
-    def of(cls, signals: Signals) -> Contact:
-        """Declare the inputs."""
-        scalars = {name: signals.input(f"contact.{name}") for name in CONTACT}
-        return cls(normal=signals.input("normal", 3), **scalars)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,12 +78,12 @@ class Line:
         return cls(index=index, **{name: signals.input(f"line_{index}.{name}") for name in LINE})
 
 
-def _names(kind: type, but: str = "") -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind) if field.name != but)
+def _names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.name != "index")
 
 
-#: Scalar inputs of contact, reference and every line.
-CONTACT, TARGET, LINE = _names(Contact, "normal"), _names(Target), _names(Line, "index")
+#: Scalar inputs of the reference and of every line.
+TARGET, LINE = _names(Target), _names(Line)
 #: Outputs of every line, "line_0.error" and so on (`ibvs_qp.tasks.line.LineState`).
 LINE_OUTPUTS = (
     "error rate integral rho_error rho_rate analytic_command angle_error angle_rate angle_command weight".split()
@@ -190,12 +98,6 @@ RUN_TIME = {
     "weights": _names(Weights),
     "limits": tuple(name for name in _names(LimitSettings) if name not in STRUCTURAL),
 }
-
-
-def gravity_direction(attitude: ca.SX) -> ca.SX:
-    """Unit gravity in B, (3,), by a quaternion; see `ibvs_qp.frames.down_in_body`."""
-    w, x, y, z = ca.vertsplit(attitude)
-    return ca.vertcat(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
 
 
 def equations(config: ControllerConfig) -> ControllerConfig:
@@ -214,8 +116,3 @@ def setting_values(config: ControllerConfig) -> dict[str, float]:
     """Values of all settings that may change at run time, by the names of their inputs."""
     sections = ((section, getattr(config, section), names) for section, names in RUN_TIME.items())
     return {f"{section}.{name}": getattr(values, name) for section, values, names in sections for name in names}
-
-
-def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:
-    """Value limited to [low, high], entry by entry."""
-    return ca.fmin(ca.fmax(value, low), high)

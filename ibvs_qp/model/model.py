@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -15,20 +15,19 @@ from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.contact import LEAST_PUSH_DENSITY
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.estimation.attitude import estimated_rate
+from ibvs_qp.estimation.external_wrench import external_wrench
+from ibvs_qp.estimation.friction import cautious_friction, estimated_friction
+from ibvs_qp.estimation.inputs import Body, Contact, motor_thrust
 from ibvs_qp.estimation.push_disturbance import Normal, PushDisturbance
+from ibvs_qp.estimation.response import carried_weight, inertial_push, missing_thrust
+from ibvs_qp.estimation.wall_lines import WallAxes
 from ibvs_qp.frames import GRAVITY, camera_twist_matrix
-from ibvs_qp.model.angular_rate import estimated_rate
-from ibvs_qp.model.attitude import attitude, wall_axes
-from ibvs_qp.model.camera_view import camera_view
-from ibvs_qp.model.external_wrench import external_wrench
 from ibvs_qp.model.feedforward import SLIDING_COMMAND, contact_feedforward
-from ibvs_qp.model.friction import cautious_friction, estimated_friction
-from ibvs_qp.model.inputs import RUN_TIME, Body, Contact, Line, Target, setting_inputs
-from ibvs_qp.model.motor_thrust import motor_thrust
-from ibvs_qp.model.reach import STANDING_SPEED, push_planes, push_reach, push_reference
-from ibvs_qp.model.response import carried_weight, inertial_push, missing_thrust
+from ibvs_qp.model.geometry import attitude, camera_view
+from ibvs_qp.model.inputs import RUN_TIME, Line, Target, setting_inputs
+from ibvs_qp.model.reach import STANDING_SPEED, push_planes, push_reach, push_reference, thrust_window
 from ibvs_qp.model.rows import Parameter
-from ibvs_qp.model.thrust_window import thrust_window
 from ibvs_qp.model.trim_tilt import TrimTilt
 from ibvs_qp.symbolic.signals import Signals
 
@@ -92,7 +91,7 @@ class Model:
         self.output("angular_acceleration", angular_acceleration)
         self.body = dataclasses.replace(body, rate=rate)
         self.rate_ahead = rate + config.angular_rate.lead_s * angular_acceleration
-        self.wall = wall_axes(self.body, self.contact)
+        self.wall = WallAxes.of_symbols(self.contact.normal, self.body.down)
         bandwidth = config.angular_rate.attitude_bandwidth_hz
         target, trim = self.target, TrimTilt(signals, config)
         self.attitude = attitude(signals, self.body, self.contact, target, self.rate_ahead, bandwidth, trim.angles)
@@ -288,6 +287,21 @@ class Model:
         linear, angular = self.acceleration[:3], self.acceleration[3:]
         linear = linear - self.normal * (along * ca.dot(self.normal, linear))
         return self.camera_twist @ ca.vertcat(linear, self.body_rotation_gain * angular)
+
+    def pivot_limited(self, stiffness: Any, pivot: Any, guides: Sequence[ca.SX]) -> ca.SX:
+        """Stiffness of an axis [1/s^2], reduced while friction alone holds the tip.
+
+        Args:
+            stiffness: Of a free vehicle [1/s^2].
+            pivot: Of a vehicle that turns about its tip, by `pivot_stiffness` [1/s^2].
+            guides: For every line 1 if it fixes the place of the tip across this axis.
+        """
+        if not self.config.contact_feedforward:
+            return ca.SX(stiffness)
+        guided = ca.SX(0.0)
+        for line, guide in zip(self.lines, guides, strict=True):
+            guided = ca.fmax(guided, guide * line.present * line.confidence)
+        return stiffness + self.tip_stationary * (1.0 - guided) * (ca.fmin(stiffness, pivot) - stiffness)
 
     @property
     def camera_twist(self) -> ca.DM:

@@ -7,9 +7,8 @@ from itertools import chain
 
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.wall_distance import FAR_AWAY
-from ibvs_qp.measurement import HORIZONTAL, VERTICAL, Measurement, Reference
+from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference, Measurement, Reference
 from ibvs_qp.model.inputs import TARGET
-from ibvs_qp.model.pairing import LinePairing
 from ibvs_qp.model.tick import ARRAYS, GIVEN, LINE, SCALARS, TickFunction
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -21,6 +20,53 @@ _NO_PLANE = (0.0, 0.0, 1.0, -1.0)
 KEPT = ("_pairing", "_lines", "_paired", "_plane", "_plane_age")
 #: Places in the entries of a line.
 _PRESENT, _VERTICAL, _CHANGED = LINE.index("present"), LINE.index("vertical"), LINE.index("changed")
+
+
+class LinePairing:
+    """Indices of the references; a pair of role and order keeps its index, and its integral, while it is referenced.
+
+    Args:
+        lines: Lines that the program has room for.
+    """
+
+    def __init__(self, lines: int) -> None:
+        self._count = lines
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every pair."""
+        self._roles: tuple[str, ...] = ()
+        self._indices: dict[tuple[str, int], int] = {}
+        self._keys: list[tuple[str, int]] = []
+
+    def assign(self, references: tuple[LineReference, ...]) -> list[int]:
+        """Give every reference its index.
+
+        Returns:
+            Indices that were freed: their states belong to another reference.
+        """
+        roles = tuple([reference.role for reference in references[: self._count]])
+        if roles == self._roles:
+            return []
+        self._roles = roles
+        self._keys = [(role, roles[:place].count(role)) for place, role in enumerate(roles)]
+        freed = [index for key, index in self._indices.items() if key not in self._keys]
+        self._indices = {key: index for key, index in self._indices.items() if key in self._keys}
+        for key in self._keys:
+            if key not in self._indices:
+                self._indices[key] = min(set(range(self._count)) - set(self._indices.values()))
+        return freed
+
+    def pairs(
+        self, lines: tuple[LineFeature, ...], references: tuple[LineReference, ...]
+    ) -> list[tuple[int, LineFeature, LineReference]]:
+        """Index, line and reference of every line with a reference, in the order of the references."""
+        found = []
+        for reference, (role, order) in zip(references, self._keys, strict=False):
+            line = _nth(lines, role, order)
+            if line is not None:
+                found.append((self._indices[role, order], line, reference))
+        return found
 
 
 class StepInputs:
@@ -133,3 +179,12 @@ def _given(contact: ContactState) -> tuple[float, ...]:
         contact.stiffness,
         contact.stiffness_known,
     )
+
+
+def _nth(lines: tuple[LineFeature, ...], role: str, order: int) -> LineFeature | None:
+    for line in lines:
+        if line.role == role:
+            if order == 0:
+                return line
+            order -= 1
+    return None

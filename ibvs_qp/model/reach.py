@@ -1,15 +1,18 @@
-"""Largest and least push within the rotors' limits, by a ray in wrench space, and the push reference within them."""
+"""What the rotors' limits allow: thrust window of a step, largest and least push, and the push reference."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from allocation.wrench_facets import ON_PLANE, RELATIVE_ZERO, WrenchFacets
 from ibvs_qp.config import ControllerConfig, VehicleParams
-from ibvs_qp.model.inputs import Body, Contact, Target, clamp
+from ibvs_qp.estimation.inputs import Body, Contact
+from ibvs_qp.model.inputs import Target
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import Signals
 
 #: Reach when nothing bounds it [N].
@@ -22,6 +25,8 @@ STANDING_SPEED = 1e-2
 REACH_FRACTION = 0.97
 #: Fastest fall and rise of the reference in contact [N/s]: a fall follows a thrust limit that was just lowered.
 FALL, RISE = 60.0, 10.0
+#: Least distance between lower and upper bound [N]: OSQP takes a row for an equality below 1e-4 and refactorises.
+LEAST_GAP = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,3 +122,25 @@ def push_reference(
     limited = clamp(allowed, last - FALL * body.dt, last + RISE * body.dt)
     allowed = signals.remember("push_allowed", ca.if_else(contact.touching, limited, allowed))
     return signals.output("push_reference", ca.if_else(target.press, allowed, 0.0))
+
+
+def thrust_window(last: Any, lower: Any, upper: Any, step: Any, floor: Any, ceiling: Any) -> tuple[Any, Any]:
+    """Bounds of the thrusts: a limit lowered in flight is approached at the rate limit.
+
+    Args:
+        last: Last thrusts [N], (n,); arrays or symbols, like all that follow.
+        lower: Lower limits now in force [N], (n,).
+        upper: Upper limits now in force [N], (n,).
+        step: Largest change in one step [N].
+        floor: Lower limits of the vehicle [N], (n,).
+        ceiling: Upper limits of the vehicle [N], (n,).
+
+    Returns:
+        Lower and upper bounds [N], (n,) each, at least `LEAST_GAP` apart.
+    """
+    least, most = (np.minimum, np.maximum) if isinstance(last, np.ndarray) else (ca.fmin, ca.fmax)
+    reach_low, reach_high = last - step, last + step
+    low = least(most(lower, reach_low), reach_high - LEAST_GAP)
+    high = most(least(upper, most(reach_high, low + LEAST_GAP)), most(reach_low, low) + LEAST_GAP)
+    low = least(most(low, floor), ceiling - LEAST_GAP)
+    return low, least(most(high, low + LEAST_GAP), ceiling)

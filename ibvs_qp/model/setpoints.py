@@ -28,8 +28,7 @@ from ibvs_qp.model.inputs import LINE_OUTPUTS, RUN_TIME, setting_values
 from ibvs_qp.model.interaction_matrix import line_interaction_matrix
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.packing import KEPT, StepInputs
-from ibvs_qp.model.reach import UNBOUNDED
-from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.reach import UNBOUNDED, thrust_window
 from ibvs_qp.model.tick import TickFunction
 
 #: Thrust step without a rate limit, before the first command [N].

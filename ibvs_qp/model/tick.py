@@ -16,11 +16,19 @@ import casadi as ca
 
 from ibvs_qp.config import LONGEST_TICK, ControllerConfig
 from ibvs_qp.estimation.contact import contact_state
-from ibvs_qp.estimation.late_motion import LATE_S, aligned, carried_line, carried_velocity, carried_wall, motion_since
-from ibvs_qp.estimation.motion_history import MotionHistory
-from ibvs_qp.estimation.stamps import FIRST_INTERVAL, LONGEST_INTERVAL
+from ibvs_qp.estimation.inputs import CONTACT, gravity_direction
+from ibvs_qp.estimation.motion_history import (
+    LATE_S,
+    MotionHistory,
+    aligned,
+    carried_line,
+    carried_velocity,
+    carried_wall,
+    motion_since,
+)
+from ibvs_qp.estimation.tick_history import FIRST_INTERVAL, LONGEST_INTERVAL
 from ibvs_qp.estimation.wall_distance import NEVER_S, Plane, Tick
-from ibvs_qp.model.inputs import CONTACT, TARGET, gravity_direction
+from ibvs_qp.model.inputs import TARGET
 from ibvs_qp.model.model import Model
 from ibvs_qp.symbolic.function import StepFunction, step_function
 from ibvs_qp.symbolic.logic import both, either, no, where

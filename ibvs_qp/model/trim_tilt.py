@@ -8,9 +8,11 @@ import math
 import casadi as ca
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.inputs import Body, Contact
 from ibvs_qp.frames import GRAVITY
-from ibvs_qp.model.inputs import Body, Contact, Target, clamp
+from ibvs_qp.model.inputs import Target
 from ibvs_qp.model.reach import PushPlanes, push_range
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import Signals
 
 #: Price of the tilt over that of a force beyond a plane [N^2/rad^2]: 2 deg cost as much as 0.1 N.

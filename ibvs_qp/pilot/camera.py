@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.estimator import Estimator
 from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import down_in_body
@@ -15,7 +16,7 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, RgbdFrame, S
 from ibvs_qp.painting.command import ExpectedEdge
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
-from ibvs_qp.pilot.estimation import AttitudeHistory, Plane
+from ibvs_qp.pilot.estimation import Plane
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features
@@ -40,7 +41,7 @@ class CameraInput:
 
     Args:
         config: Configuration of the flight.
-        history: Attitude and turn at the time of capture.
+        estimator: Attitude and turn at the time of capture.
         seen_as: Applied to the features of every picture, for studies of perception errors.
     """
 
@@ -49,10 +50,10 @@ class CameraInput:
     def __init__(
         self,
         config: PilotConfig,
-        history: AttitudeHistory,
+        estimator: Estimator,
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None,
     ) -> None:
-        self._config, self._history, self._seen_as = config, history, seen_as
+        self._config, self._estimator, self._seen_as = config, estimator, seen_as
         self._most_lines = LINES_PER_SLOT * config.controller.line_slots
         self._loader = PerceptionLoader(config)
         self._mount = TurnedCamera(config.controller.vehicle.camera_turn_deg)
@@ -92,7 +93,7 @@ class CameraInput:
         """Place of the expected painted edge beside the brush in a picture, by the contact of the tick before."""
         if expected is None or not contact.known:
             return ()
-        axes = WallAxes.of(contact.normal, down_in_body(self._history.attitude(stamp_ns)))
+        axes = WallAxes.of(contact.normal, down_in_body(self._estimator.attitude_at(stamp_ns)))
         angle = 0.5 * math.pi if expected.role == HORIZONTAL else 0.0
         rho, theta, _ = image_line(expected.offset, angle, axes, self._tip_from_camera, contact.distance)
         span = self._hint_spans[expected.role, expected.ahead]
@@ -148,8 +149,8 @@ class CameraInput:
         self.picture = self._camera.picture(image)
         self.perception_result = perception.process(
             self.picture,
-            attitude=np.array(self._history.attitude(image.stamp_ns)),
-            rotation=self._history.turn(last_ns, image.stamp_ns),
+            attitude=np.array(self._estimator.attitude_at(image.stamp_ns)),
+            rotation=self._estimator.turn(last_ns, image.stamp_ns),
             velocity=velocity,
             hints=hints,
         )
@@ -167,7 +168,7 @@ class CameraInput:
         if seen is not None:
             plane = self.plane if seen.plane is None else seen.plane
             motion = seen.velocity if velocity is None else velocity
-            seen = self._shutter.features(seen, image, plane, motion, self._history.rate(image.stamp_ns))
+            seen = self._shutter.features(seen, image, plane, motion, self._estimator.rate_at(image.stamp_ns))
         return seen if self._seen_as is None or seen is None else self._seen_as(seen)
 
 

@@ -17,16 +17,15 @@ from ibvs_qp.command import Command, SafetyState
 from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.estimation.estimator import INERTIAL
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.flight_state import FlightState, put_state, take_state
-from ibvs_qp.frames import down_in_body
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.painting.strategy import Strategy
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.estimation import Estimation
-from ibvs_qp.pilot.inertial import INERTIAL
 from ibvs_qp.pilot.planning import FLYING, Planning
 from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus
@@ -73,7 +72,7 @@ class Pilot:
 
     Attributes:
         camera: Perception input: pictures or features of the flight.
-        estimation: Filters, and the measurement of a tick; of them `contact`, `motion` (along the wall) and `tare`.
+        estimation: Filters, and the measurement of a tick; of them `contact`, and `motion` along the wall.
         planning: Strategy and reference.
         supervision: Monitors, state machine and reactions; of it `self_check` (of the sensors' axes).
         controller: The law.
@@ -101,9 +100,9 @@ class Pilot:
         self.config = config = config or PilotConfig()
         settings, vehicle = config.controller, config.controller.vehicle
         self._gate, self._limits = SensorGate(config.camera.latest_s), ThrustLimits(vehicle.geometry.count)
-        self.estimation = estimation = Estimation(config)
-        self.contact, self.motion, self.tare = estimation.contact, estimation.motion, estimation.tare
-        self.camera = CameraInput(config, estimation.history, seen_as)
+        self.estimation = estimation = Estimation(config, self._gate)
+        self.estimator, self.contact, self.motion = estimation.estimator, estimation.contact, estimation.motion
+        self.camera = CameraInput(config, estimation.estimator, seen_as)
         self.planning = Planning(config, painter)
         self.supervision = Supervision(settings, config.safety, LoadCheck(vehicle, config.safety))
         self.self_check, self.push_report = self.supervision.self_check, PushReport()
@@ -251,13 +250,14 @@ class Pilot:
         turned = supervision.rotor_loss.turns(self.contact.state.normal[0])
         features = self._perceive(frame, turned, rejected)
         # estimate
-        frame = estimation.sense(frame, self._gate, Fault.IMU_FROZEN in supervision.faults, setpoints, dt)
-        sample = supervision.contact_wrench(estimation.tared_wrench(frame), stamp, turned, setpoints)
-        plane = self.camera.plane, self.camera.plane_ns
-        contact, found = estimation.update_contact(stamp, sample, *plane, self.reference.contact)
+        frame, plane = estimation.in_body(frame), (self.camera.plane, self.camera.plane_ns)
+        wrench = supervision.replaced_wrench(frame.wrench_stamp_ns, stamp, turned, setpoints)
+        frozen, press = Fault.IMU_FROZEN in supervision.faults, self.reference.contact
+        contact, found = estimation.predict(frame, setpoints, plane, wrench, frozen=frozen, press=press)
         planning.note("wall", found)
         rejected += self._check_axes(frame, contact, dt)
-        axes = estimation.update_motion(stamp, sample[0], features, setpoints, dt, rejected)
+        if features is not None:
+            estimation.correct(features, rejected)
         # plan
         limits = supervision.limits(self.thrust_limits)
         target = planning.plan(estimation, supervision, limits, setpoints.push_reference, dt, rejected)
@@ -266,7 +266,7 @@ class Pilot:
         turning = supervision.rotor_loss.lost
         drifting = turning or supervision.state not in FLYING
         self.measurement = estimation.measurement(
-            frame, sample, axes, target.guides, plane, limits, drifting=drifting, turning=turning
+            frame, target.guides, plane, limits, drifting=drifting, turning=turning
         )
         # law
         begin = time.perf_counter()
@@ -288,7 +288,7 @@ class Pilot:
         self.planning.time_s = (stamp_ns - self._first_ns) * 1e-9
         if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
             self._leaps = self._gate.clock.leaps
-            self.estimation.doubt()
+            self.estimator.doubt()
         return dt
 
     def _perceive(self, frame: SensorFrame, turned: bool, rejected: list[str]) -> FeatureFrame | None:
@@ -312,7 +312,7 @@ class Pilot:
         if "wrench" not in missing:
             force, noted = frame.wrench[:3].tolist(), check.note
             free = contact.known and contact.distance > self.config.estimation.tare_distance_m
-            check.load(frame.wrench, frame.wrench_stamp_ns, self.estimation.inertial.force, free, dt)
+            check.load(frame.wrench, frame.wrench_stamp_ns, self.estimator.force, free, dt)
             if check.note != noted:
                 self.planning.note("force sensor", check.note)
         return self.supervision.check_axes(inertial, force, contact, dt)
@@ -332,10 +332,10 @@ class Pilot:
 
     def _tick(self, frame: SensorFrame, contact: ContactState, command: Command) -> Tick:
         """Inputs of the monitors."""
-        now, motion, inertial, faults = self._gate.last, self.motion, self.estimation.inertial, dict[Fault, str]()
+        now, motion, estimator, faults = self._gate.last, self.motion, self.estimator, dict[Fault, str]()
         if motion.refused_s > self.config.safety.refusal_s:
             faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
-        if inertial.lost:
+        if estimator.lost:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
         sampled = not any(name in self._gate.replaced for name in INERTIAL)
         right, down = motion.state[0:2]
@@ -348,8 +348,8 @@ class Pilot:
             lines_ns=motion.lines_ns if self.reference.lines else -1,
             inertial=(now["attitude"], now["angular_velocity"], now["specific_force"]),
             wrench=now["wrench"],
-            down=down_in_body(inertial.attitude),
-            rate=inertial.rate,
+            down=estimator.axes.gravity,
+            rate=estimator.rate,
             speed=math.hypot(right, down, contact.speed),
             height=-motion.state[5],
             contact=contact,

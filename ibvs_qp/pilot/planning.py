@@ -76,7 +76,7 @@ class Planning:
             time_since_touch=contact.time_since_touch,
             push=contact.push,
             push_reference=push_reference,
-            tared=estimation.tare.ready,
+            tared=estimation.estimator.tared,
         )
         if rotors.update(limits):
             self.painter.abandon(inputs, "no level hover is left")
@@ -85,7 +85,7 @@ class Planning:
         command = self.painter.fly(inputs)
         if self.painter.fault:
             rejected.append(self.painter.fault)
-        attitude = rotors.target(contact, estimation.inertial.attitude, motion.state[0], dt)
+        attitude = rotors.target(contact, estimation.estimator.attitude, motion.state[0], dt)
         return dataclasses.replace(command, **attitude) if attitude else command
 
     def reference(self, command: PaintingCommand, contact: ContactState) -> Reference:

@@ -14,11 +14,12 @@ from scipy import sparse
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.limits.limit import WIDE, Limit
-from ibvs_qp.model.inputs import clamp, setting_values
+from ibvs_qp.model.inputs import setting_values
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import LimitRow, TaskRow
 from ibvs_qp.qp.solver import DenseProgram
 from ibvs_qp.symbolic.function import ArrayFunction, StepFunction
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
 

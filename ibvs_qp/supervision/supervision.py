@@ -139,13 +139,18 @@ class Supervision:
 
         It is zero for a vehicle that has turned from the wall: its sensor measures the tool that swings round.
         """
-        wrench, stamp_ns = sample
-        last = self._last
+        return self.replaced_wrench(sample[1], now_ns, turned, setpoints) or sample
+
+    def replaced_wrench(self, sample_ns: int, now_ns: int, turned: bool, setpoints: Setpoints) -> WrenchSample | None:
+        """What `contact_wrench` has in place of a sample of that time; None while the sample counts."""
+        wrench, last = None, self._last
         if last is not None and last.faults and self.settings.supervise:
             if any(fault in last.faults for fault in _WRENCH):
                 force = -max(setpoints.inertial_push, 0.0) * np.array(last.contact.normal)
-                wrench, stamp_ns = np.concatenate((force, np.cross(self._tip, force))), now_ns
-        return np.zeros(6) if turned else wrench, stamp_ns
+                wrench, sample_ns = np.concatenate((force, np.cross(self._tip, force))), now_ns
+        if turned:
+            wrench = np.zeros(6)
+        return None if wrench is None else (wrench, sample_ns)
 
     # --------------------------------------------------------------- decisions
 

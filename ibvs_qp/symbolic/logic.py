@@ -33,3 +33,8 @@ def no(condition: ca.SX) -> ca.SX:
 def wrapped(angle: ca.SX) -> ca.SX:
     """The same angle within -pi and pi [rad]."""
     return angle - 2.0 * math.pi * ca.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+def clamp(value: ca.SX, low: float | ca.SX, high: float | ca.SX) -> ca.SX:
+    """Value limited to [low, high], entry by entry."""
+    return ca.fmin(ca.fmax(value, low), high)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ibvs_qp.model.feedforward import pivot_stiffness
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
 from ibvs_qp.tasks.task import Task
 
 
@@ -33,6 +33,6 @@ class LevelTask(Task):
         """Roll and pitch accelerations [rad/s^2], (2,); softer in pitch while friction alone holds the tip."""
         gains, (soft, _) = model.gains, pivot_stiffness(model.config, model.gains)
         level = [1.0 - line.vertical for line in model.lines]
-        stiffness = ca.vertcat(gains.attitude_kp, pivot_limited(model, gains.attitude_kp, soft, level))
+        stiffness = ca.vertcat(gains.attitude_kp, model.pivot_limited(gains.attitude_kp, soft, level))
         target = -stiffness * model.attitude.tilt_error - gains.attitude_kd * model.attitude.tilt_rate_ahead
         return model.filtered(target, model.acceleration[3:5], gains.attitude_filter_s)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import LEAST_GAIN, LINE_OUTPUTS, Line, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN, LINE_OUTPUTS, Line
 from ibvs_qp.model.interaction_matrix import endpoint_line_row, symbolic_line_rows
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.task import Task
 
 #: Errors enter the law up to this size [normalised]: a far line is approached at a constant pace.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.model.feedforward import moment_lag
-from ibvs_qp.model.inputs import LEAST_GAIN, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.task import Task
 
 #: Bound of the force integral as a force [N].

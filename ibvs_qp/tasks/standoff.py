@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import clamp
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.task import Task
 
 #: Peak force of a touch while the stiffness is unknown [N]: v = F / sqrt(k m).

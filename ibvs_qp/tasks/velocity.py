@@ -6,9 +6,10 @@ from typing import Any
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import LEAST_GAIN, clamp
+from ibvs_qp.model.inputs import LEAST_GAIN
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.line import free_directions
 from ibvs_qp.tasks.task import Task
 

@@ -6,10 +6,10 @@ import math
 
 import casadi as ca
 
-from ibvs_qp.model.inputs import clamp
+from ibvs_qp.model.feedforward import pivot_stiffness
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.rows import TaskRow
-from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.task import Task
 
 #: With a rotor lost: largest yaw acceleration [rad/s^2] and weight over that of a level vehicle [-]. The moment that is
@@ -39,7 +39,7 @@ class YawTask(Task):
     def target(self, model: Model) -> ca.SX:
         """Yaw acceleration [rad/s^2]; softer while friction alone holds the tip sideways."""
         gains, (_, soft) = model.gains, pivot_stiffness(model.config, model.gains)
-        stiffness = pivot_limited(model, gains.yaw_kp, soft, [line.vertical for line in model.lines])
+        stiffness = model.pivot_limited(gains.yaw_kp, soft, [line.vertical for line in model.lines])
         damping = -gains.yaw_kd * model.rate_ahead[2]
         facing = -stiffness * model.attitude.yaw + damping
         turned = ca.fabs(model.attitude.yaw) > LARGEST_TURN  # behind the seam at 180 degrees it would drive the spin

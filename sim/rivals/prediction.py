@@ -23,9 +23,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ibvs_qp.model.inputs import clamp
+from ibvs_qp.model.feedforward import pivot_stiffness
 from ibvs_qp.model.model import Model
-from ibvs_qp.model.stationary_tip import pivot_limited, pivot_stiffness
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.line import LineTask, free_directions, line_state
 from ibvs_qp.tasks.yaw import LOST_ACCELERATION
 from sim.rivals.horizon import MpcSettings
@@ -152,8 +152,8 @@ class Prediction:
         model, settings, gains = self._model, self._settings, self._model.config.gains
         attitude, rate = model.attitude, model.body.rate
         (soft_pitch, soft_yaw), lines = pivot_stiffness(model.config), model.lines
-        pitch = pivot_limited(model, 1.0, soft_pitch / gains.attitude_kp, [1.0 - line.vertical for line in lines])
-        yaw = pivot_limited(model, 1.0, soft_yaw / gains.yaw_kp, [line.vertical for line in lines])
+        pitch = model.pivot_limited(1.0, soft_pitch / gains.attitude_kp, [1.0 - line.vertical for line in lines])
+        yaw = model.pivot_limited(1.0, soft_yaw / gains.yaw_kp, [line.vertical for line in lines])
         level = 1.0 - attitude.tilted
         # A vehicle that lost a rotor cannot hold yaw: it brakes as the shipped law does.
         braking = attitude.tilted * clamp(-gains.yaw_kd * rate[2], -LOST_ACCELERATION, LOST_ACCELERATION)

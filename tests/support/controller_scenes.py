@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.estimation.roll_pitch import UNFILTERED_HZ
+from ibvs_qp.estimation.attitude import UNFILTERED_HZ
 from ibvs_qp.frames import R_BODY_CAMERA, cross
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference, Measurement, Reference
 

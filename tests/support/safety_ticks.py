@@ -9,11 +9,11 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
+from ibvs_qp.estimation.contact import no_contact
 from ibvs_qp.supervision.monitors import Tick
 
 TICK_NS = 4_000_000
-CONTACT = ContactEstimator(ControllerConfig()).state._replace(
+CONTACT = no_contact(ControllerConfig())._replace(
     known=True, distance=-0.003, push=5.0, in_contact=True, time_since_touch=3.0, contact_weight=1.0
 )
 

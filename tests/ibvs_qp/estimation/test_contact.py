@@ -7,29 +7,12 @@ import math
 import numpy as np
 import pytest
 from controller_scenes import TICK_NS, Wall, attitude, measured
+from estimators import ContactEstimator
 
 from ibvs_qp.config import ContactSettings, ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.measurement import Measurement
 
 LEVEL = attitude()
-DOWN = (0.0, 0.0, 1.0)
-
-
-def update(estimator: ContactEstimator, measurement: Measurement, press: bool = False) -> ContactState:
-    force = measurement.specific_force
-    return estimator.update(
-        stamp_ns=measurement.stamp_ns,
-        angular_velocity=measurement.angular_velocity.tolist(),
-        specific_force=None if force is None else force.tolist(),
-        down=DOWN,
-        contact_wrench=measurement.contact_wrench,
-        wrench_stamp_ns=measurement.wrench_stamp_ns,
-        plane=measurement.plane,
-        plane_stamp_ns=measurement.plane_stamp_ns,
-        press=press,
-    )
 
 
 def approach_speed(t: float) -> float:
@@ -53,7 +36,7 @@ def run(latency_ticks: int, seconds: float = 12.0) -> tuple[np.ndarray, np.ndarr
             noisy = distances[k - latency_ticks] + rng.normal(0.0, 1e-3)
             plane = Wall(LEVEL, noisy).plane, (k - latency_ticks + 1) * TICK_NS
         changes = {"plane": plane[0], "plane_stamp_ns": plane[1]} if plane else {"plane": None}
-        state = update(estimator, measured(k, specific_force=force, **changes))
+        state = estimator.measure(measured(k, specific_force=force, **changes))
         rows.append((t, -speed, state.rate))
     times, true, found = np.array(rows).T
     return times, true, found
@@ -93,7 +76,7 @@ def test_a_turning_body_moves_the_tip_although_its_centre_stays() -> None:
         yaw = rate * k * config.tick_s
         wall = Wall(LEVEL, 0.2, turn - yaw)  # distance measured at the nominal tip, whatever; only the rate matters
         spin = np.array([0.0, 0.0, rate])
-        state = update(estimator, measured(k, angular_velocity=spin, plane=wall.plane if k == 0 else None))
+        state = estimator.measure(measured(k, angular_velocity=spin, plane=wall.plane if k == 0 else None))
         expected = -float(np.dot(state.normal, np.cross(spin, [0.7, 0.0, 0.0])))
         assert k == 0 or state.rate == pytest.approx(expected, abs=1e-9)
         np.testing.assert_allclose(state.normal, wall.normal, atol=2e-3)  # carried by the gyro alone
@@ -130,7 +113,7 @@ class Press:
                 plane_stamp_ns=stamp,
             )
             before = self.state.in_contact
-            touches += update(self.estimator, sensors, press).in_contact and not before
+            touches += self.estimator.measure(sensors, press).in_contact and not before
             self.tick, distance = self.tick + 1, distance - 0.004 * speed
         return touches
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from symbolic_block import Block
 
-from ibvs_qp.estimation.late_motion import (
+from ibvs_qp.estimation.motion_history import (
+    MotionHistory,
     aligned,
     carried_line,
     carried_velocity,
@@ -19,7 +20,6 @@ from ibvs_qp.estimation.late_motion import (
     motion_since,
     rotation_from_vector,
 )
-from ibvs_qp.estimation.motion_history import MotionHistory
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
 from ibvs_qp.frames import rotation_from_vector as rotation
 

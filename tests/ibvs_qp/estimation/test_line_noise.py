@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from controller_scenes import TICK_NS, Wall, attitude
+from estimators import PlaneMotion
+from symbolic_block import Block
 
-from ibvs_qp.config import EstimationConfig, VehicleParams
-from ibvs_qp.estimation.line_noise import WINDOW, SteadyValue, WhiteNoise
+from ibvs_qp.config import EstimationConfig
+from ibvs_qp.estimation.line_tracking import LineRecord
+from ibvs_qp.estimation.noise import WINDOW, WhiteNoise
 from ibvs_qp.estimation.wall_lines import WallAxes
-from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
 
-VEHICLE = VehicleParams()
 TICK, DEPTH, LATE = 0.004, 0.50, 15
 SIGMAS = (0.02, 0.08, 0.12)
 WALL = Wall(attitude(), 0.0)
@@ -26,7 +27,7 @@ class Row:
     """A tip that slides left at 0.1 m/s past a level edge and towards an upright one, seen 60 ms late at 30 Hz."""
 
     def __init__(self, sigma: float, seed: int = 0, slope: float = 0.0, flip: bool = False) -> None:
-        self.motion = WallMotion(np.array(VEHICLE.tip_position_m), np.array(VEHICLE.camera_position_m), TICK)
+        self.motion = PlaneMotion()
         self.axes = WallAxes.of(WALL.normal.tolist(), WALL.gravity.tolist())
         self.sigma, self.slope, self.flip = sigma, slope, flip
         self.rng, self.tick, self.pictures = np.random.default_rng(seed), 0, 0
@@ -62,6 +63,11 @@ class Row:
             velocity_covariance=np.eye(3) * 9e-6,
         )
 
+    def record(self, name: str) -> float:
+        """What the filter remembers of the level line."""
+        place = len(LineRecord._fields) * self.motion.lines[1].slot + LineRecord._fields.index(name)
+        return self.motion._step.states["lines.records"][place]
+
     def fly(self, seconds: float) -> np.ndarray:
         """Errors and claimed deviations of the level line's offset after every picture [m], (k, 2)."""
         found = []
@@ -71,7 +77,7 @@ class Row:
             self.tick += 1
             self.motion.predict(self.tick * TICK_NS, self.axes, (0.0, gain, -9.81), (0.0, 0.0, 0.0), TICK, 0.0)
             if self.tick % 8 == 0 and self.tick > LATE:
-                self.motion.correct(self.picture(self.tick - LATE), self.axes, 0.0)
+                self.motion.see(self.picture(self.tick - LATE), self.axes, 0.0)
                 self.pictures += 1
             if self.tick % 8 == 1 and 1 in self.motion.lines:
                 line = self.motion.lines[1]
@@ -82,41 +88,32 @@ class Row:
 # ----------------------------------------------------------------------------------------------- noise of a series
 
 
+def learned(innovations: np.ndarray) -> np.ndarray:
+    """Variances found in a series that no filter follows."""
+
+    def build(signals):
+        states = [signals.state(name) for name in WhiteNoise._fields]
+        innovation, noise = signals.input("innovation"), WhiteNoise(*states)
+        noise = noise.averaged(noise.sample(innovation - noise.residual, 1e-8))._replace(residual=innovation)
+        for name, value in zip(WhiteNoise._fields, noise, strict=True):
+            signals.remember(name, value)
+        return noise.variance
+
+    block = Block(build)
+    return np.array([block(innovation=innovation)[0] for innovation in innovations])
+
+
 @pytest.mark.parametrize("sigma", [1e-3, 1e-2, 6e-2])
 def test_the_noise_is_found_while_the_filter_drifts(sigma: float) -> None:
     """White noise on a steady drift that the filter does not follow at all: the drift is not taken for noise."""
-    rng, noise, found = np.random.default_rng(1), WhiteNoise(), []
-    for k in range(600):
-        innovation = 0.2 * sigma * k + sigma * rng.standard_normal()
-        noise.learn(innovation - noise.residual, 1e-8)
-        noise.residual = innovation
-        found.append(noise.variance)
+    rng = np.random.default_rng(1)
+    found = learned(0.2 * sigma * np.arange(600) + sigma * rng.standard_normal(600))
     assert math.sqrt(np.mean(found[WINDOW:])) == pytest.approx(sigma, rel=0.1)
 
 
 def test_one_leap_is_not_taken_for_noise() -> None:
-    rng, noise = np.random.default_rng(2), WhiteNoise()
-    for k in range(200):
-        innovation = (1.0 if k >= 150 else 0.0) + 1e-3 * rng.standard_normal()
-        noise.learn(innovation - noise.residual, 1e-8)
-        noise.residual = innovation
-        if k == 150:
-            assert math.sqrt(noise.variance) < 2e-3
-    assert math.sqrt(noise.variance) < 1.5e-3
-
-
-def test_a_steady_value_becomes_the_mean_and_knows_how_good_it_is() -> None:
-    errors, claims = [], []
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        first = 0.12 * rng.standard_normal()
-        angle = SteadyValue(value=first, spread=1e-6)
-        for _ in range(120):
-            angle.correct(0.12 * rng.standard_normal(), 1e-6, CONFIG.angle_noise**2 / 30.0)
-        errors.append(angle.value)
-        claims.append(angle.spread)
-    assert np.std(errors) < 1.3 * 0.12 / math.sqrt(120)
-    assert np.mean(np.square(errors) / claims) == pytest.approx(1.0, abs=0.45)
+    found = learned(1.0 * (np.arange(200) >= 150) + 1e-3 * np.random.default_rng(2).standard_normal(200))
+    assert math.sqrt(found[150]) < 2e-3 and math.sqrt(found[-1]) < 1.5e-3
 
 
 # -------------------------------------------------------------------------------------------------- lines on a wall
@@ -132,8 +129,8 @@ def test_the_filter_finds_sigma_and_is_consistent(sigma: float) -> None:
         found = row.fly(3.5)
         line = row.motion.lines[1]
         assert line.frames == row.pictures  # never refused, never begun anew
-        assert math.sqrt(line.noise.variance) == pytest.approx(sigma * DEPTH, rel=0.5)
-        assert math.sqrt(line.tilt.noise.variance) == pytest.approx(sigma, rel=0.5)
+        assert math.sqrt(row.record("variance")) == pytest.approx(sigma * DEPTH, rel=0.5)
+        assert math.sqrt(row.record("angle_variance")) == pytest.approx(sigma, rel=0.5)
         errors.append(found[:, 0])
         ratios.append(np.mean((found[:, 0] / found[:, 1]) ** 2))
     spread = float(np.sqrt(np.mean(np.square(errors))))
@@ -148,9 +145,9 @@ def test_clean_pictures_pass_as_before() -> None:
     row.fly(1.5)
     found = row.fly(3.0)
     assert np.abs(found[:, 0]).max() < CONFIG.line_std_m
-    assert row.motion.lines[1].noise.total(CONFIG.line_std_m**2) == CONFIG.line_std_m**2
-    tilt = row.motion.lines[1].tilt
-    gain = 1.0 - tilt.spread / (tilt.spread + CONFIG.angle_noise**2 / 30.0)
+    assert row.record("variance") < CONFIG.line_std_m**2
+    spread = row.motion.lines[1].theta_variance
+    gain = 1.0 - spread / (spread + CONFIG.angle_noise**2 / 30.0)
     assert gain > 0.1  # a clean angle is followed within a quarter of a second
 
 
@@ -160,7 +157,7 @@ def test_noise_that_begins_in_flight_is_learned_and_the_good_estimate_kept() -> 
     row.sigma = 0.08
     found = row.fly(2.0)
     assert np.abs(found[:, 0]).max() < 6e-3
-    assert row.motion.lines[1].frames > 40 and math.sqrt(row.motion.lines[1].noise.variance) > 0.02
+    assert row.motion.lines[1].frames > 40 and math.sqrt(row.record("variance")) > 0.02
 
 
 def test_a_real_leap_under_noise_is_a_new_line() -> None:

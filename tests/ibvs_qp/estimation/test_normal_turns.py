@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from symbolic_block import Block
 
-from ibvs_qp.estimation.normal_turns import mirrored_normal
+from ibvs_qp.estimation.wall_distance import mirrored_normal
 from ibvs_qp.symbolic.logic import wrapped
 
 PERIOD_S = 1.0 / 30.0

@@ -8,8 +8,7 @@ import pytest
 from symbolic_block import Block
 
 from ibvs_qp.config import ContactSettings
-from ibvs_qp.estimation.stiffness import stiffness
-from ibvs_qp.estimation.touch_compliance import Compliance
+from ibvs_qp.estimation.stiffness import Compliance, stiffness
 
 SETTINGS = ContactSettings()
 ASSUMED = SETTINGS.estimation.assumed_stiffness_n_m

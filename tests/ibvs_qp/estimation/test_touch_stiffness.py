@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from controller_scenes import TICK_NS, Wall, attitude
+from estimators import ContactEstimator
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
 
 CONFIG = ControllerConfig()
 ESTIMATION = CONFIG.contact.estimation
@@ -59,9 +59,7 @@ class Touches:
         force = np.clip(acceleration, -5.0, 5.0) + self.rng.normal(0.0, 0.1)
         self.estimator.update(
             stamp_ns=(self.tick + 1) * TICK_NS,
-            angular_velocity=(0.0, 0.0, 0.0),
             specific_force=(force, 0.0, -9.81),
-            down=(0.0, 0.0, 1.0),
             contact_wrench=np.array([-(push + self.rng.normal(0.0, 0.05)), 0.0, 0.0, 0.0, 0.0, 0.0]),
             wrench_stamp_ns=(self.tick // 3 * 3 + 1) * TICK_NS,
             plane=self.plane if self.plane_ns > 0 else None,

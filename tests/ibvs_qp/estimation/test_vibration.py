@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from estimators import ContactEstimator
 from symbolic_block import Block
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.estimation.vibration import noise_density, vibration_variance
+from ibvs_qp.estimation.noise import noise_density, vibration_variance
 
 TICK = 0.004
 DOWN = (0.0, 0.0, 1.0)
@@ -39,11 +39,8 @@ class Wall:
     ) -> ContactState:
         return self._estimator.update(
             stamp_ns=stamp_ns,
-            angular_velocity=(0.0, 0.0, 0.0),
             specific_force=force,
             down=down,
-            contact_wrench=np.zeros(6),
-            wrench_stamp_ns=0,
             plane=seen and seen[0],
             plane_stamp_ns=seen[1] if seen else 0,
         )

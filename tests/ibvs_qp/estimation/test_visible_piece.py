@@ -8,18 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from controller_scenes import TICK_NS, Wall, attitude
+from estimators import PlaneMotion, wall_line
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ibvs_qp.config import EstimationConfig
-from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.estimation.wall_lines import WallAxes, wall_line
-from ibvs_qp.estimation.wall_motion import VELOCITY, WallMotion
+from ibvs_qp.estimation.wall_lines import WallAxes
+from ibvs_qp.estimation.wall_motion import VELOCITY
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
 
-VEHICLE = VehicleParams()
-TIP, CAMERA = np.array(VEHICLE.tip_position_m), np.array(VEHICLE.camera_position_m)
 LEVEL = attitude()
 TICK = 0.004
 angle = st.floats(-0.25, 0.25)
@@ -45,16 +43,8 @@ def test_middle_and_length_of_the_visible_piece(
     for flip in (False, True):
         for ordered in (segment, segment[::-1].copy()):
             line = replace(wall.line(offset, tilt, role, flip=flip), segment=ordered)
-            found = wall_line(line, axes_of(wall), TIP - CAMERA, distance)
-            assert found is not None
-            assert found.middle == pytest.approx(along, abs=1e-9)
-            assert found.length == pytest.approx(0.2, abs=1e-9)
-
-
-def test_a_line_without_end_points_has_no_middle() -> None:
-    wall = Wall(LEVEL, 0.05)
-    found = wall_line(wall.line(0.05, 0.5 * math.pi, HORIZONTAL), axes_of(wall), TIP - CAMERA, 0.05)
-    assert found is not None and math.isnan(found.middle) and found.length == 0.0
+            found = wall_line(line, axes_of(wall), distance)
+            assert (found["middle"], found["length"]) == pytest.approx((along, 0.2), abs=1e-9)
 
 
 def test_the_middle_of_a_level_line_grows_to_the_left() -> None:
@@ -66,13 +56,12 @@ def test_the_middle_of_a_level_line_grows_to_the_left() -> None:
         wall.line(0.05, 0.5 * math.pi, HORIZONTAL),
         segment=np.array([(ray[0] / ray[2], ray[1] / ray[2]) for ray in rays]),
     )
-    found = wall_line(line, axes_of(wall), TIP - CAMERA, 0.05)
-    assert found is not None and found.middle == pytest.approx(0.15)
+    assert wall_line(line, axes_of(wall), 0.05)["middle"] == pytest.approx(0.15)
 
 
-def still_beside(kind: str, seconds: float, swing_m_s: float = 0.0, segment: np.ndarray | None = None) -> WallMotion:
+def still_beside(kind: str, seconds: float, swing_m_s: float = 0.0, segment: np.ndarray | None = None) -> PlaneMotion:
     """A tip at rest beside a level line that moves to and fro at that speed, seen 60 ms late at 30 Hz."""
-    wall, motion = Wall(LEVEL, 0.0), WallMotion(TIP, CAMERA, TICK)
+    wall, motion = Wall(LEVEL, 0.0), PlaneMotion()
     axes = axes_of(wall)
     for tick in range(1, round(seconds / TICK)):
         motion.predict(tick * TICK_NS, axes, np.array([0.0, 0.0, -9.81]), np.zeros(3), TICK, 0.0)
@@ -88,7 +77,7 @@ def still_beside(kind: str, seconds: float, swing_m_s: float = 0.0, segment: np.
                 velocity=velocity,
                 velocity_covariance=noise,
             )
-            motion.correct(frame, axes, 0.0)
+            motion.see(frame, axes, 0.0)
     return motion
 
 
@@ -100,6 +89,11 @@ def test_a_tracked_line_carries_the_piece_of_its_last_frame() -> None:
     line = still_beside("board", 1.0, segment=segment).lines[1]
     assert line.length == pytest.approx(0.3, abs=1e-6) and line.middle == pytest.approx(-0.05, abs=1e-6)
     assert line.seen_angle == pytest.approx(0.5 * math.pi) and line.seen_offset == pytest.approx(0.05, abs=1e-6)
+
+
+def test_a_line_without_end_points_has_no_middle() -> None:
+    line = still_beside("board", 1.0).lines[1]
+    assert math.isnan(line.middle) and line.length == 0.0
 
 
 def test_a_painted_edge_that_swings_says_less_of_the_velocity_than_a_board_s() -> None:

@@ -6,16 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from estimators import ContactEstimator
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.estimation.contact import ContactEstimator
 from ibvs_qp.estimation.wall_distance import AGREED_PLANES, GAP_S, MOST_REOPENED, ODD_PLANES
 
 TICK_S, TICK_NS = 0.004, 4_000_000
 CONFIG = ControllerConfig()
 AHEAD = CONFIG.vehicle.tip_position_m[0] - CONFIG.vehicle.camera_position_m[0]
 DISTANCE = 0.3
-REST, GRAVITY, DOWN = (0.0, 0.0, 0.0), (0.0, 0.0, -9.81), (0.0, 0.0, 1.0)
+GRAVITY = (0.0, 0.0, -9.81)
 
 
 def plane(degrees: float, distance: float = DISTANCE) -> tuple[float, float, float, float]:
@@ -37,11 +37,7 @@ class Watched:
             self.tick += pause
             self.wall = self.estimator.update(
                 stamp_ns=self.tick * TICK_NS,
-                angular_velocity=REST,
                 specific_force=GRAVITY,
-                down=DOWN,
-                contact_wrench=np.zeros(6),
-                wrench_stamp_ns=0,
                 plane=plane(degrees, distance),
                 plane_stamp_ns=self.tick * TICK_NS,
             )

@@ -14,9 +14,8 @@ from allocation import control_effectiveness
 from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, MotionLoop, motion_sensitivity
 from ibvs_qp.config import AngularRateSettings, ConfigError, ControllerConfig, Gains
 from ibvs_qp.config.gains import LONGEST_FILTER
-from ibvs_qp.model.angular_rate import estimated_rate
-from ibvs_qp.model.inputs import Body
-from ibvs_qp.model.motor_thrust import motor_thrust
+from ibvs_qp.estimation.attitude import estimated_rate
+from ibvs_qp.estimation.inputs import Body, motor_thrust
 
 TICK = 0.004
 #: Motors that rise and fall alike, so that the vehicle is linear.

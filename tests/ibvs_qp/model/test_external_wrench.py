@@ -11,9 +11,8 @@ from symbolic_block import Block
 from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.model.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
-from ibvs_qp.model.inputs import Body, Contact
-from ibvs_qp.model.motor_thrust import motor_thrust
+from ibvs_qp.estimation.external_wrench import FORCE_BOUND, MOMENT_BOUND, external_wrench
+from ibvs_qp.estimation.inputs import Body, Contact, motor_thrust
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)

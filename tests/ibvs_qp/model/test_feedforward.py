@@ -10,8 +10,8 @@ import pytest
 from symbolic_block import Block
 
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.inputs import Body, Contact
 from ibvs_qp.model.feedforward import contact_feedforward
-from ibvs_qp.model.inputs import Body, Contact
 
 CONFIG, TICK = ControllerConfig(), 0.004
 PUSH, FRICTION = 5.0, 0.3

@@ -7,8 +7,8 @@ import pytest
 from symbolic_block import Block
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.model.friction import ASSUMED_FRICTION, FRICTION_RANGE, estimated_friction
-from ibvs_qp.model.inputs import Body, Contact
+from ibvs_qp.estimation.friction import ASSUMED_FRICTION, FRICTION_RANGE, estimated_friction
+from ibvs_qp.estimation.inputs import Body, Contact
 
 #: Place of the tip, ahead of the centre of mass and above it [m].
 TIP = (0.6, 0.0, -0.1)

@@ -10,8 +10,8 @@ from controller_scenes import CEILING, FLOOR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ibvs_qp.model.reach import LEAST_GAP, thrust_window
 from ibvs_qp.model.reporting import clip
-from ibvs_qp.model.thrust_window import LEAST_GAP, thrust_window
 
 BOX = np.full(1, FLOOR), np.full(1, CEILING)
 STEP = 2.0

@@ -18,7 +18,8 @@ from allocation import TAROT_T960, WrenchFacets, tilted_push_reach
 from ibvs_qp.config import ControllerConfig, LimitSettings
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.model.inputs import Body, Contact, Target
+from ibvs_qp.estimation.inputs import Body, Contact
+from ibvs_qp.model.inputs import Target
 from ibvs_qp.model.model import Model
 from ibvs_qp.model.reach import push_planes, push_reach
 from ibvs_qp.model.trim_tilt import TRIM_FRACTION, TrimTilt

@@ -23,7 +23,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.frames import R_BODY_CAMERA, camera_twist_matrix
 from ibvs_qp.measurement import Reference
 from ibvs_qp.model.interaction_matrix import endpoint_line_row, line_interaction_matrix
-from ibvs_qp.model.thrust_window import LEAST_GAP, thrust_window
+from ibvs_qp.model.reach import LEAST_GAP, thrust_window
 from ibvs_qp.qp.explain import active_limits
 from ibvs_qp.qp.solver import AcceptedSolution
 

@@ -39,7 +39,7 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.config import ControllerConfig, LimitSettings, SolverSettings
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
-from ibvs_qp.model.thrust_window import thrust_window
+from ibvs_qp.model.reach import thrust_window
 from ibvs_qp.qp.solver import BOUND_SLIP, Solution
 from ibvs_qp.qp.solvers.osqp import OUTCOMES, OsqpSolver
 

@@ -155,12 +155,12 @@ def test_what_raises_when_it_is_read_is_named_and_held() -> None:
 
 
 def test_an_estimator_that_raises_is_named_and_held(monkeypatch: pytest.MonkeyPatch) -> None:
-    def raising(**_: Any) -> Any:
+    def raising(*_: Any, **__: Any) -> Any:
         raise RuntimeError
 
     pilot, commands = flown_with({}, 50)
     with monkeypatch.context() as broken:
-        broken.setattr(pilot.contact, "update", raising)
+        broken.setattr(pilot.estimator, "predict", raising)
         bad = pilot.step(frames()[50])
     assert bad.outcome is Outcome.HOLD and bad.rejected[0].startswith("pilot: RuntimeError in raising")
     assert np.abs(bad.thrusts - commands[-1].thrusts).max() <= RATE_STEP + 1e-9

@@ -12,7 +12,7 @@ import pytest
 from ibvs_qp.config import ControllerConfig, LimitSettings
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.measurement import FeatureFrame
-from ibvs_qp.model import stationary_tip
+from ibvs_qp.model import feedforward
 from ibvs_qp.model.model import Model
 from ibvs_qp.tasks import velocity
 from sim.experiments.scenes import near_wall
@@ -77,7 +77,7 @@ def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
 
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     assert rocking(press(**STIFF_YAW)) < 0.5
-    monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
+    monkeypatch.setattr(feedforward, "STIFFNESS_FRACTION", 1e3)
     assert rocking(press(**STIFF_YAW)) > 1.0
 
 
@@ -146,7 +146,7 @@ def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
 @pytest.mark.usefixtures("lines_lost")
 def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     assert nodding(press(hold_s=12.0, **STIFF_PITCH)) < 0.5
-    monkeypatch.setattr(stationary_tip, "STIFFNESS_FRACTION", 1e3)
+    monkeypatch.setattr(feedforward, "STIFFNESS_FRACTION", 1e3)
     assert nodding(press(hold_s=12.0, **STIFF_PITCH)) > 1.0
 
 
@@ -154,7 +154,7 @@ def test_the_gains_of_a_held_vehicle_are_a_third_of_the_stability_limits() -> No
     config = ControllerConfig()
     vehicle, gains = config.vehicle, config.gains
     swing = vehicle.mass_kg * 0.7**2 * (0.0575 + 1.0 / (16.0 * np.pi))
-    pitch, yaw = stationary_tip.pivot_stiffness(config)
+    pitch, yaw = feedforward.pivot_stiffness(config)
     assert yaw == pytest.approx(gains.yaw_kd * (vehicle.inertia_kg_m2[2] / swing + gains.velocity_kp) / 3.0)
     assert pitch == pytest.approx(gains.attitude_kd * (vehicle.inertia_kg_m2[1] / swing + gains.velocity_kp) / 3.0)
     assert yaw < gains.yaw_kp and pitch < gains.attitude_kp

@@ -10,8 +10,6 @@ import pytest
 from closed_loop_rigs import short_scene
 
 from ibvs_qp.command import Outcome
-from ibvs_qp.estimation.kalman import HISTORY, DelayedKalman
-from ibvs_qp.estimation.stamps import StampRing
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from sim.flight.options import FlightOptions, pilot_config
@@ -19,7 +17,6 @@ from sim.flight.surroundings import World
 
 TICK_NS = 4_000_000
 SECOND = 1_000_000_000
-CHAIN = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])  # distance, speed, bias
 
 
 def moved(frame: SensorFrame, by_ns: int) -> SensorFrame:
@@ -102,45 +99,3 @@ def test_leaps_of_any_size_are_recovered_from_and_no_time_that_passed(law: str, 
     newest = max(line.seen_ns for line in pilot.motion.lines.values())
     for age_ns in (pilot.measurement.stamp_ns - newest, pilot.measurement.stamp_ns - pilot.measurement.wrench_stamp_ns):
         assert 0 <= age_ns < 0.12 * SECOND
-
-
-def test_a_stamp_finds_the_nearest_tick_whatever_the_ticks_lengths() -> None:
-    rng, ring = np.random.default_rng(0), StampRing(0.004)
-    assert ring.age(0) is None
-    stamps: list[int] = []
-    for _ in range(3 * HISTORY):
-        gap = int(rng.choice([TICK_NS // 4, TICK_NS, 3 * TICK_NS, 40 * TICK_NS], p=[0.7, 0.2, 0.08, 0.02]))
-        stamps.append((stamps[-1] if stamps else 0) + gap + int(rng.integers(-500_000, 500_000)))
-        ring.add(stamps[-1])
-    kept = np.array(stamps[-HISTORY:])
-    for wanted in rng.integers(kept[0], kept[-1], 200):
-        age = ring.age(int(wanted))
-        assert age is not None
-        assert abs(kept[-1 - age] - wanted) == np.abs(kept - wanted).min()
-    assert ring.age(int(kept[0]) - TICK_NS) is None and ring.age(stamps[-1] + 2 * TICK_NS) is None
-
-
-def test_a_late_correction_over_uneven_ticks_equals_the_replay() -> None:
-    """Frames dropped on the way: corrected at the capture's own time, moved on by the ticks' own lengths."""
-    rng = np.random.default_rng(1)
-    lengths = rng.choice([1, 1, 1, 2, 5], 60)
-    stamps = np.cumsum(lengths) * TICK_NS
-    inputs = rng.normal(0.0, 0.01, (60, 3))
-
-    def fly(at: int) -> DelayedKalman:
-        """Correct tick 40 once tick `at` has been predicted."""
-        f = DelayedKalman(CHAIN, np.array([1e-10, 1e-6, 1e-7]), np.array([0.1, 0.1, 0.1]), 0.004, 6.0)
-        for k in range(60):
-            dt = lengths[k] * TICK_NS * 1e-9
-            f.remember(int(stamps[k]), f.state + dt * (f.chain @ f.state) + inputs[k], dt)
-            if k in (5, 15, 25):  # so that distance, speed and bias are correlated
-                f.correct_entry(int(stamps[k]), 0, 0.01, 1e-4, 1e6)
-            if k == at:
-                assert f.correct_entry(int(stamps[40]), 0, 0.02, 1e-4, 1e6)
-        return f
-
-    late, replay = fly(59), fly(40)
-    np.testing.assert_allclose(late.state, replay.state, atol=1e-12)
-    one, other = late.at(int(stamps[50])), replay.at(int(stamps[50]))
-    assert one is not None and other is not None
-    np.testing.assert_allclose(one, other, atol=1e-12)

@@ -75,7 +75,7 @@ def zeroed(seen_as: Callable[[SensorFrame], SensorFrame]) -> Callable[[SensorFra
 def test_a_force_sensor_in_wrong_axes_is_named_before_the_tare(order: list[int], sign: float) -> None:
     pilot, names = found(2500, of_wrench(order, sign))
     assert len(names) == 1 and names[0].startswith("self-check: force sensor: turned by ")
-    assert not pilot.tare.ready and not pilot.self_check.passed
+    assert not pilot.estimator.tared and not pilot.self_check.passed
 
 
 @pytest.mark.parametrize(("order", "sign"), AXES)
@@ -125,7 +125,7 @@ def test_the_load_of_a_right_sensor_is_no_turn_in_20_flights(world: str) -> None
     for seed in range(20):
         pilot.reset()
         flown = World(scene, dataclasses.replace(OPTIONS, seed=seed), config)
-        while not pilot.tare.ready:
+        while not pilot.estimator.tared:
             command = pilot.step(flown.sense())
             flown.act(command.thrusts)
         flown.close()

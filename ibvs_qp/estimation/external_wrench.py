@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig, VehicleParams
+from ibvs_qp.estimation.inputs import Body, Contact, MotorThrust
 from ibvs_qp.estimation.push_disturbance import FORCE_BOUND, filter_gain, gust_weight
-from ibvs_qp.model.inputs import Body, Contact, clamp
-from ibvs_qp.model.motor_thrust import MotorThrust
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import Signals
 
 #: Bandwidth of the force observer in free flight, and in contact in the wall's plane in calm air [rad/s]; in gusts it

@@ -1,4 +1,4 @@
-"""Steps of the attitude: absorbed at once, given back slowly; everything else passes unchanged."""
+"""Steps of the attitude: absorbed at once, given back slowly; roll and pitch by rate and attitude."""
 
 from __future__ import annotations
 
@@ -7,11 +7,27 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from symbolic_block import Block
 
-from ibvs_qp.estimation.attitude_steps import RETURN_RATE, AttitudeSteps
+from ibvs_qp.estimation.attitude import RETURN_RATE, UNFILTERED_HZ, continuous_attitude, filtered_roll_pitch
 
 TICK = 0.004
 REST = (0.0, 0.0, 0.0)
+
+
+class AttitudeSteps:
+    """The continuous attitude, or None while it is the measured one."""
+
+    def __init__(self) -> None:
+        self._block = Block(
+            lambda signals: continuous_attitude(
+                signals, signals.input("measured", 4), signals.input("rate", 3), signals.input("dt")
+            )
+        )
+
+    def update(self, attitude: list[float], rate: tuple[float, float, float], dt: float) -> list[float] | None:
+        given = self._block(measured=attitude, rate=rate, dt=dt).tolist()
+        return None if given == attitude else given
 
 
 def quaternion(*euler_deg: float) -> list[float]:
@@ -82,3 +98,48 @@ def test_the_sign_of_a_quaternion_means_nothing() -> None:
     for _ in range(500):  # nor does it leave the attitude to a gyro with a bias
         flipped = steps.update([-entry for entry in attitude], (0.02, 0.0, 0.0), TICK)
         assert flipped is None or angle_deg(flipped, attitude) < 0.01
+
+
+# ----------------------------------------------------------------------------------------------- roll and pitch
+
+HZ = 12.0
+
+
+def roll_pitch(bandwidth_hz: float = HZ) -> Block:
+    def build(signals):
+        angles, rates = signals.input("angles", 2), signals.input("rates", 2)
+        return filtered_roll_pitch(signals, angles, rates, bandwidth_hz, signals.input("dt"))
+
+    return Block(build)
+
+
+def test_the_first_estimate_counts_in_full() -> None:
+    np.testing.assert_allclose(roll_pitch()(angles=[0.1, -0.2], rates=[1.0, 1.0]), [0.1, -0.2])
+
+
+def test_noise_of_the_attitude_falls_and_a_rotation_is_not_late() -> None:
+    """A low-pass of this bandwidth would be 13 ms late."""
+    rng, estimate, found, true = np.random.default_rng(0), roll_pitch(), [], []
+    for tick in range(2000):
+        phase = 2.0 * math.pi * 2.0 * tick * TICK
+        angle, rate = 0.02 * math.sin(phase), 0.02 * 4.0 * math.pi * math.cos(phase - math.pi * 2.0 * TICK)
+        noise = 0.001 * rng.standard_normal(2)
+        found.append(estimate(angles=angle + noise, rates=[rate, rate]))
+        true.append([angle, angle])
+    error = (np.array(found) - np.array(true))[100:]
+    gain = 1.0 - math.exp(-2.0 * math.pi * HZ * TICK)
+    assert float(np.std(error)) == pytest.approx(0.001 * math.sqrt(gain / (2.0 - gain)), rel=0.1)
+
+
+def test_a_biased_rate_leaves_its_share_of_the_time_constant() -> None:
+    estimate = roll_pitch()
+    for _ in range(1000):
+        found = estimate(angles=[0.0, 0.0], rates=[0.01, -0.01])
+    gain = 1.0 - math.exp(-2.0 * math.pi * HZ * TICK)
+    np.testing.assert_allclose(found, np.array([1.0, -1.0]) * 0.01 * TICK * (1.0 - gain) / gain, rtol=1e-6)
+
+
+def test_at_the_largest_bandwidth_the_attitude_is_taken_as_it_is() -> None:
+    estimate = roll_pitch(UNFILTERED_HZ)
+    for _ in range(3):
+        np.testing.assert_array_equal(estimate(angles=[0.03, 0.01], rates=[5.0, -5.0]), [0.03, 0.01])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 
 from ibvs_qp.config import ContactSettings
-from ibvs_qp.model.inputs import Body, Contact, clamp
+from ibvs_qp.estimation.inputs import Body, Contact
+from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import Signals
 
 #: Friction assumed while nothing is known (the plant's nominal brush) and plausible range.

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.model.inputs import Body, Contact
-from ibvs_qp.model.motor_thrust import MotorThrust
+from ibvs_qp.estimation.inputs import Body, Contact, MotorThrust
+from ibvs_qp.estimation.push_disturbance import filter_gain
 from ibvs_qp.symbolic.signals import Signals
 
 #: Bandwidth of the residual wrench [rad/s]: it has half of a step after 23 ms.
@@ -47,8 +47,8 @@ def inertial_push(
     ready = ca.logic_and(motors.ready, body.specific_force_known)
     signals.output("wind_spread", _wind_spread(signals, outside - body.wrench[:3], contact.normal, ready, body.dt))
     away = ca.logic_and(ca.logic_not(contact.touching), contact.distance > AWAY * config.contact.contact_distance_m)
-    new = ca.if_else(ready, old + _gain(PUSH_BANDWIDTH, body.dt) * (-ca.dot(contact.normal, outside) - old), old)
-    learnt = ca.if_else(ca.logic_and(ready, away), mean + _gain(FREE_BANDWIDTH, body.dt) * (new - mean), mean)
+    new = ca.if_else(ready, old + filter_gain(PUSH_BANDWIDTH, body.dt) * (-ca.dot(contact.normal, outside) - old), old)
+    learnt = ca.if_else(ca.logic_and(ready, away), mean + filter_gain(FREE_BANDWIDTH, body.dt) * (new - mean), mean)
     signals.remember("inertial_push_free", learnt)
     return signals.output("inertial_push", signals.remember("inertial_push", new) - learnt)
 
@@ -59,7 +59,7 @@ def _wind_spread(signals: Signals, force: ca.SX, normal: ca.SX, ready: ca.SX, dt
     along = force - normal * ca.dot(normal, force)
 
     def followed(name: str, old: ca.SX, target: ca.SX, time: float) -> ca.SX:
-        return signals.remember(name, ca.if_else(ready, old + _gain(1.0 / time, dt) * (target - old), old))
+        return signals.remember(name, ca.if_else(ready, old + filter_gain(1.0 / time, dt) * (target - old), old))
 
     smooth = followed("wind", smooth, along, 1.0 / PUSH_BANDWIDTH)
     steady = followed("wind_steady", steady, smooth, STEADY_TIME)
@@ -72,7 +72,7 @@ def carried_weight(
     """Weight that something else than the rotors carries, low-passed [N]: that of a vehicle on the ground."""
     outside = config.vehicle.mass_kg * body.specific_force - ca.DM(effectiveness[:3]) @ motors.thrusts
     old, ready = signals.state("carried_weight"), ca.logic_and(motors.ready, body.specific_force_known)
-    new = ca.if_else(ready, old + _gain(PUSH_BANDWIDTH, body.dt) * (-ca.dot(body.down, outside) - old), old)
+    new = ca.if_else(ready, old + filter_gain(PUSH_BANDWIDTH, body.dt) * (-ca.dot(body.down, outside) - old), old)
     return signals.output("carried_weight", signals.remember("carried_weight", new))
 
 
@@ -105,7 +105,7 @@ def missing_thrust(
     """
     vehicle, matrix = config.vehicle, ca.DM(effectiveness)
     rotors = matrix @ motors.thrusts
-    gain = _gain(RESIDUAL_BANDWIDTH, body.dt)
+    gain = filter_gain(RESIDUAL_BANDWIDTH, body.dt)
     old_force, old_moment = signals.state("residual_force", 3), signals.state("residual_moment", 3)
     force = vehicle.mass_kg * body.specific_force - rotors[:3] - body.wrench[:3]
     momentum = ca.sparsify(vehicle.inertia) @ body.gyro
@@ -128,14 +128,10 @@ def missing_thrust(
     time = signals.remember("missing_time", ca.if_else(ready, time + body.dt, time))
     average = ca.if_else(time < FIRST_SECONDS, body.dt / ca.fmax(time, 1e-9), 0.0)
     healthy = ca.logic_and(ready, ca.mmax(ca.fabs(missing - mean)) < LEARNT_UP_TO)
-    step = ca.fmax(_gain(LEARNING_BANDWIDTH, body.dt), average) * (missing - mean)
+    step = ca.fmax(filter_gain(LEARNING_BANDWIDTH, body.dt), average) * (missing - mean)
     mean = signals.remember("missing_mean", ca.if_else(healthy, mean + step, mean))
     power, spread = signals.state("missing_power"), ca.sumsqr(missing - mean) / effectiveness.shape[1]
-    gain = ca.fmax(_gain(LEARNING_BANDWIDTH, body.dt), average)
+    gain = ca.fmax(filter_gain(LEARNING_BANDWIDTH, body.dt), average)
     power = signals.remember("missing_power", ca.if_else(healthy, power + gain * (spread - power), power))
     signals.output("missing_noise", ca.sqrt(power))
     return signals.output("missing_thrust", missing - mean)
-
-
-def _gain(bandwidth: float, dt: ca.SX) -> ca.SX:
-    return 1.0 - ca.exp(-bandwidth * dt)

@@ -1,0 +1,128 @@
+"""Attitude without steps that the gyro did not see; roll and pitch; angular velocity by gyro and motors."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.estimation.inputs import Body, MotorThrust
+from ibvs_qp.quaternion import multiply
+from ibvs_qp.symbolic.logic import both, either, where
+from ibvs_qp.symbolic.signals import Signals
+
+#: Least difference between an attitude and the one predicted by the gyro that is a step [rad], and least one in root
+#: mean squares of that difference [-]: noise that counts as steps makes the attitude a random walk, 20 deg in 30 s at
+#: 0.3 deg a sample.
+STEP, STEP_SIGMAS = math.radians(1.0), 6.0
+#: Averaging time of that mean square at 100 Hz and more [s], time for which one sample counts at most, late as it may
+#: be [s], and its largest root [rad]: 0.3 deg a sample and axis, or a spell of steps.
+NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
+#: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
+#: the direction of gravity.
+RETURN_RATE = math.radians(0.5)
+#: From this bandwidth on the attitude estimate counts as it is [Hz].
+UNFILTERED_HZ = 1000.0
+
+
+def continuous_attitude(signals: Signals, measured: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.SX:
+    """Attitude (w, x, y, z) without steps that the gyro did not see: absorbed at once, given back slowly.
+
+    An estimator that re-aligns itself moves its attitude by degrees in one tick. Taken at once, gravity leaks into
+    the accelerations along the wall and the wall normal, 0.34 m/s^2 for 2 degrees, faster than any filter learns it.
+
+    Args:
+        signals: Registry.
+        measured: Attitude, (4,).
+        rate: Angular velocity in B [rad/s], (3,).
+        dt: Time since the last tick [s].
+    """
+    begun, power = signals.state("steps.begun"), signals.state("steps.power")
+    # Rotation from the attitude given out to the measured one; without one the measured attitude stays as it is.
+    offset, absorbed = signals.state("steps.offset", 4, (1.0, 0.0, 0.0, 0.0)), signals.state("steps.absorbed")
+    last = where(begun, signals.state("steps.last", 4, (1.0, 0.0, 0.0, 0.0)), measured)
+    predicted = _product(last, ca.vertcat(1.0, 0.5 * dt * rate))
+
+    sine = ca.norm_2(offset[1:])
+    left = 2.0 * ca.atan2(sine, ca.fabs(offset[0])) - RETURN_RATE * dt
+    absorbed = both(absorbed, left > 0.0)
+    scale = ca.sin(0.5 * left) / where(absorbed, sine, 1.0)
+    shorter = ca.vertcat(ca.cos(0.5 * left), where(offset[0] < 0.0, -scale, scale) * offset[1:])
+    offset = where(absorbed, shorter, ca.DM([1.0, 0.0, 0.0, 0.0]))
+
+    given = where(absorbed, _product(measured, offset), measured)
+    step, gate = _angle(predicted, given), ca.fmax(STEP, STEP_SIGMAS * ca.sqrt(power))
+    square = ca.fmin(ca.fmin(step, gate), MOST_NOISE) ** 2
+    signals.remember("steps.power", power + ca.fmin(dt, LONGEST_SAMPLE) / NOISE_TIME * (square - power))
+    steps = step > gate
+    given = where(steps, predicted / ca.norm_2(predicted), given)
+    new_offset = _product(_inverse(measured), predicted)
+    signals.remember("steps.offset", where(steps, new_offset / ca.norm_2(new_offset), offset))
+    signals.remember("steps.absorbed", either(steps, absorbed))
+    signals.remember("steps.begun", ca.SX(1.0))
+    return signals.remember("steps.last", given)
+
+
+def filtered_roll_pitch(signals: Signals, angles: ca.SX, rates: ca.SX, bandwidth_hz: float, dt: ca.SX) -> ca.SX:
+    r"""Roll and pitch [rad], (2,), by a complementary filter: angular velocity above a frequency, attitude below.
+
+    .. math:: \dot{\hat\varphi} = \dot\varphi + 2\pi f (\varphi - \hat\varphi)
+
+    An attitude estimate has noise of 0.07 deg a sample in the datasheet world; a stiff level row passes it on to the
+    rotors.
+
+    Args:
+        signals: Registry of the filter's state.
+        angles: Roll and pitch of the attitude estimate [rad], (2,).
+        rates: Their rates [rad/s], (2,).
+        bandwidth_hz: f [Hz].
+        dt: Time since the last step [s].
+    """
+    if bandwidth_hz >= UNFILTERED_HZ:
+        return angles
+    before, begun = signals.state("roll_pitch", 2), signals.state("roll_pitch_begun")
+    predicted = before + dt * rates
+    gain = 1.0 - ca.exp(-2.0 * math.pi * bandwidth_hz * dt)
+    signals.remember("roll_pitch_begun", ca.SX(1.0))
+    return signals.remember("roll_pitch", ca.if_else(begun, predicted + gain * (angles - predicted), angles))
+
+
+def estimated_rate(
+    signals: Signals, config: ControllerConfig, effectiveness: np.ndarray, body: Body, motors: MotorThrust
+) -> tuple[ca.SX, ca.SX]:
+    r"""Angular velocity [rad/s] and acceleration [rad/s^2] in B, (3,) each.
+
+    .. math:: \hat\alpha = J^{-1}(B_M \hat u + M_{ext} - \Omega\times J\Omega), \qquad
+              \dot{\hat\Omega} = \hat\alpha + 2\pi f (\Omega - \hat\Omega)
+
+    with the gyro Omega, the lagged thrusts :math:`\hat u`, the moments observed and fed forward at the step before, and
+    f = ``angular_rate.gyro_bandwidth_hz``. Above f the motors' model counts: the rotors do not see the gyro's noise,
+    and a commanded rotation is not late, as it is behind a low-pass filter.
+    """
+    inertia = ca.sparsify(config.vehicle.inertia)
+    outside = signals.state("external_moment", 3)
+    if config.contact_feedforward:
+        outside += signals.state("feedforward_moment", 3)
+    moment = ca.DM(effectiveness[3:]) @ motors.thrusts + outside - ca.cross(body.gyro, inertia @ body.gyro)
+    awake = ca.logic_and(motors.ready, body.dt > 0.0)
+    acceleration = ca.if_else(awake, ca.solve(inertia, moment), 0.0)
+    gain = 1.0 - ca.exp(-2.0 * math.pi * config.angular_rate.gyro_bandwidth_hz * body.dt)
+    predicted = signals.state("angular_rate", 3) + body.dt * acceleration
+    rate = ca.if_else(awake, predicted + gain * (body.gyro - predicted), body.gyro)
+    return signals.remember("angular_rate", rate), acceleration
+
+
+def _angle(first: ca.SX, second: ca.SX) -> ca.SX:
+    """Angle between two attitudes [rad]; a quaternion and its negative are one."""
+    between = _product(_inverse(first), second)
+    return 2.0 * ca.atan2(ca.norm_2(between[1:]), ca.fabs(between[0]))
+
+
+def _product(first: ca.SX, second: ca.SX) -> ca.SX:
+    return ca.vertcat(*multiply(ca.vertsplit(first), ca.vertsplit(second)))
+
+
+def _inverse(quaternion: ca.SX) -> ca.SX:
+    return ca.vertcat(quaternion[0], -quaternion[1:])
