@@ -9,13 +9,13 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from ibvs_qp.config import ControllerConfig
 from sim.bench.timing import Bench, Row, Stopwatch
 from sim.flight.closed_loop import make_pilot
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.world.plant import TICK_NS
 from sim.world.scene import Scene
 
 #: Stages of a tick, in the order in which they run. Estimation is all of the pilot but vision and control.
@@ -43,7 +43,7 @@ def bench_loop(seed: int, progress: Callable[[str], None]) -> Bench:
         for features in ("rendered", "geometric"):
             progress(f"a {features} flight")
             times = stage_times(seed, features)
-            flown_s = len(times["physics"]) * TICK_NS * 1e-9
+            flown_s = len(times["physics"]) * ControllerConfig.tick_s
             rows += [Row(name=f"{features}_{stage}", times_us=spent.tolist()) for stage, spent in times.items()]
             stages |= {f"{features}_{stage}": float(spent.sum()) / flown_s for stage, spent in times.items()}
             ratios[f"{features}_real_time"] = 1e6 * flown_s / sum(float(spent.sum()) for spent in times.values())

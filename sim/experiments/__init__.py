@@ -12,6 +12,7 @@ NAMES = (
     "rotor-derate",
     "approach",
     "payload",
+    "rates",
     "mismatch",
     "worlds",
     "rivals",

@@ -11,17 +11,17 @@ from ibvs_qp.command import Outcome
 from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.flight_truth import euler_angles, in_body, rotations
+from sim.flight.options import ticks_in
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
-from sim.world.plant import STEPS_PER_TICK
 from sim.world.readout import PLACES
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, true_vehicle
 
 OUTCOMES = tuple(str(outcome) for outcome in Outcome)
-#: Ticks per logged propeller clearance, which changes slowly (the plant checks for strikes at every tick).
-CLEARANCE_TICKS = 5
+#: Time between logged propeller clearances [s], which change slowly (the plant checks for strikes at every tick).
+CLEARANCE_S = 0.02
 #: Columns of one number per tick, in the order in which `Recorder.tick` writes them.
 NUMBERS = "t phase row outcome step_us iterations reach_margin".split()
 #: Columns of integers.
@@ -78,6 +78,8 @@ def assemble(flown: Flown, rows: LoggedRows) -> dict[str, np.ndarray]:
     arrays["row"][~pressed] = 0
     signals = {name: arrays.pop(name) for name in logged_signals(slots)}
     arrays["line_error_px"] = _line_errors(signals, slots, camera_intrinsics(flown.scene.camera)[0])
+    pushes = arrays.pop("pushes").reshape(ticks, -1)
+    arrays |= {"push_true": pushes[:, -1].copy(), "contact_1khz": pushes.reshape(-1)}
     arrays |= _estimates(signals) | _truth(flown, arrays.pop("truth"))
     active, price = np.zeros((ticks, len(rows.limits)), dtype=bool), np.zeros((ticks, len(rows.limits)))
     for tick, paid in rows.active.items():
@@ -91,7 +93,7 @@ def assemble(flown: Flown, rows: LoggedRows) -> dict[str, np.ndarray]:
     arrays["true_thrust_min"], arrays["true_thrust_max"] = rows.thrust_limits
     arrays["true_mass"] = np.array([flown.vehicle.mass_kg])
     arrays["vision_ms"] = np.array(rows.vision_ms, float)
-    arrays["painting_1khz"] = np.repeat(pressed, STEPS_PER_TICK)
+    arrays["painting_1khz"] = np.repeat(pressed, pushes.shape[1])
     return arrays
 
 
@@ -109,19 +111,17 @@ def _truth(flown: Flown, truth: np.ndarray) -> dict[str, np.ndarray]:
     """Truth from the plant's readings at every tick, (N, numbers), see `sim.world.readout`."""
     position, attitude = (truth[:, PLACES[name]] for name in ("position", "quaternion"))
     rotation = rotations(attitude)
-    rare = slice(None, None, CLEARANCE_TICKS)
+    every = ticks_in(CLEARANCE_S, flown.config.controller.tick_s)
+    rare = slice(None, None, every)
     clearance = flown.clearance.distances(position[rare], rotation[rare])
-    pushes = truth[:, PLACES["pushes"]]
     return {
         "position": position.copy(),
         "attitude": attitude.copy(),
         "velocity": in_body(rotation, truth[:, PLACES["velocity"]]),
         "euler": euler_angles(rotation),
         "tip": position + rotation @ np.array(flown.vehicle.tip_position_m),
-        "push_true": pushes[:, -1].copy(),
-        "contact_1khz": pushes.reshape(-1),
         "friction_true": truth[:, PLACES["friction"]].copy(),
-        "propeller_clearance": np.repeat(clearance, CLEARANCE_TICKS)[: len(truth)],
+        "propeller_clearance": np.repeat(clearance, every)[: len(truth)],
     }
 
 

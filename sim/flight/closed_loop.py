@@ -12,14 +12,13 @@ from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.faults.fault import Fault
 from sim.faults.schedule import FaultSchedule
 from sim.flight.jobs import Job, OwnJob, PaintJob
-from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.options import FlightOptions, pilot_config, ticks_in
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
 from sim.flight.trace import CRASH, INTERRUPTED, LANDED, Event, Trace
 from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.board import BoardGeometry
-from sim.world.plant import TICK_NS
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
@@ -31,8 +30,8 @@ Progress = Callable[[float, str, float], None]
 
 #: Ending of MCAP logs.
 MCAP = ".mcap"
-#: Control ticks between calls of the progress function.
-PROGRESS_TICKS = 125
+#: Flight time between calls of the progress function [s].
+PROGRESS_S = 0.5
 #: Time-out of a flight [s]: start and corners, plus the strokes, each painted again twice, both ways, and slowly.
 BASE_TIME, STROKE_FACTOR = 90.0, 8.0
 
@@ -72,7 +71,7 @@ def fly(
     Args:
         scene: The truth.
         options: Law, seed, features, picture size and so on.
-        progress: Called every `PROGRESS_TICKS` with time, phase and real-time factor.
+        progress: Called every `PROGRESS_S` with time, phase and real-time factor.
         config: Flown instead of the preset.
         job: Task at the wall; None paints.
         faults: Faults and their times.
@@ -88,12 +87,12 @@ def fly(
     log = open_mcap(options, world, pilot)
     fly_tick = pilot.step if log is None else log.step
     limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting, BoardGeometry(scene).strokes)
-    start, reason, tick = time.perf_counter(), "", 0
+    start, reason, tick, shown = time.perf_counter(), "", 0, ticks_in(PROGRESS_S, config.controller.tick_s)
     try:
         command = None
         while not pilot.painter.finished or schedule.watching:
             for text in schedule.tick(world, pilot):
-                recorder.note(tick * TICK_NS * 1e-9, "fault", text)
+                recorder.note(world.plant.time_ns * 1e-9, "fault", text)
                 if log is not None:
                     log.note("fault", text)
             frame = world.sense()
@@ -111,18 +110,18 @@ def fly(
             if world.plant.landed:
                 reason = LANDED
                 break
-            if tick * TICK_NS * 1e-9 > limit:
+            if world.plant.time_ns * 1e-9 > limit:
                 reason = f"time-out after {limit:.0f} s of flight"
                 break
-            if progress is not None and tick % PROGRESS_TICKS == 0:
-                flown = tick * TICK_NS * 1e-9
+            if progress is not None and tick % shown == 0:
+                flown = world.plant.time_ns * 1e-9
                 progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
         reason = INTERRUPTED
     finally:
         world.close()
         if log is not None and (problem := log.close()):
-            recorder.note(tick * TICK_NS * 1e-9, "log", problem)
+            recorder.note(world.plant.time_ns * 1e-9, "log", problem)
     trace = recorder.trace()
     trace.wall_time_s = time.perf_counter() - start  # includes the trace
     planned = not reason or (reason == LANDED and pilot.painter.descending)
@@ -131,5 +130,5 @@ def fly(
     if isinstance(job, OwnJob):
         trace.legs = legs
     if reason:
-        trace.events.append(Event(t=tick * TICK_NS * 1e-9, kind="end", text=reason))
+        trace.events.append(Event(t=world.plant.time_ns * 1e-9, kind="end", text=reason))
     return trace

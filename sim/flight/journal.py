@@ -16,8 +16,8 @@ import numpy as np
 
 from ibvs_qp.config.errors import IbvsQpError
 
-#: Ticks per chunk, 0.1 s of flight: the most that a killed process loses.
-CHUNK_TICKS = 25
+#: Flight time in a chunk [s]: the most that a killed process loses.
+CHUNK_S = 0.1
 ROWS, NOTES = ".rows", ".jsonl"
 
 

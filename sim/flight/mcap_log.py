@@ -105,7 +105,7 @@ class McapLog:
             attitude=part["quaternion"],
             angular_velocity_rad_s=part["rate"],
             tip_m=part["tip"],
-            push_n=float(part["pushes"][-1]),
+            push_n=float(part["push"][0]),
             friction_n=part["friction"],
             thrusts_n=thrusts,
         )

@@ -15,12 +15,16 @@ from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.vehicles.configuration import with_vehicle
 from sim.vehicles.vehicle_file import read_vehicle
 from sim.world.board import BoardGeometry
-from sim.world.plant import TICK_NS
+from sim.world.mjcf import STEP_NS
 from sim.world.scene import Scene
 
 if TYPE_CHECKING:
     from sim.rivals.horizon import MpcSettings
 
+#: Most physics steps in a control tick: 100 Hz, at which the lag of a tick already costs half the margin.
+MOST_STEPS = 10
+#: Rounding of a period over that of a physics step [-].
+ROUNDING = 1e-6
 #: Decimals of a calibration [-]: hundredths of a pixel.
 CALIBRATION_DIGITS = 2
 #: Board beyond the margin up to which stroke 1 begins at the margin [m]: half the tolerance of its length.
@@ -52,6 +56,11 @@ class FlightOptions:
     view: bool = False
     journal: str = ""
     mcap: bool = False
+
+
+def ticks_in(time_s: float, tick_s: float) -> int:
+    """Whole ticks in a time, at least one."""
+    return max(1, round(time_s / tick_s))
 
 
 def unsupervised(config: PilotConfig) -> PilotConfig:
@@ -93,12 +102,13 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
         config: Replaces the preset.
 
     Raises:
-        ConfigError: If the controller expects another period than the one that is simulated.
+        ConfigError: If the control period is no whole number of physics steps.
     """
     if config is None:
         config = _given(options)
-    if round(config.controller.tick_s * 1e9) != TICK_NS:
-        allowed = f"the simulated loop ticks every {TICK_NS * 1e-9:g} s"
+    steps = config.controller.tick_s * 1e9 / STEP_NS
+    if abs(steps - round(steps)) > ROUNDING or not 1 <= round(steps) <= MOST_STEPS:
+        allowed = f"the simulated loop ticks every 1 to {MOST_STEPS} physics steps of {STEP_NS * 1e-9:g} s"
         raise out_of_range("controller.tick_s", config.controller.tick_s, "s", allowed)
     paint = scene.paint
     painting = dataclasses.replace(

@@ -6,6 +6,7 @@ but for motors that are much slower than the vehicle's.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 
@@ -14,6 +15,7 @@ import numpy as np
 from allocation import WrenchFacets, worst_level_reach
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.frames import GRAVITY, rotation_from_vector
 from ibvs_qp.painting.pattern import PLACE_TOLERANCE_M, ROWS
 from ibvs_qp.pilot import PilotConfig
@@ -22,6 +24,7 @@ from sim.flight.jobs import Job, PaintJob
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import GROUND_CLEARANCE_M
+from sim.world.mjcf import STEP_NS
 from sim.world.scene import ImuScene, Scene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
 
@@ -63,7 +66,7 @@ def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job
 
 def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> list[str]:
     """What forbids a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
-    problems = [*_sensors(scene, config), *_wind(scene, config), *_motors(scene, config)]
+    problems = [*_sensors(scene, config), *_wind(scene, config), *_motors(scene, config), *_period(config)]
     if features == "rendered":
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
@@ -282,6 +285,21 @@ def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
             yield _problem("wind.mean_m_s", list(wind.mean_m_s), "m/s", allowed, reason, strength)
         else:
             yield _problem(*strength, f"allowed is at most {(held - mean) / GUST_DEVIATIONS:.3g} N", reason)
+
+
+def _period(config: PilotConfig) -> Iterator[str]:
+    """The delay of a tick leaves the loops of the body their margin; gains that lack it at any period are not its."""
+
+    def peak(tick_s: float) -> float:
+        return max(motion_sensitivity(dataclasses.replace(config.controller, tick_s=tick_s)).values())
+
+    tick = config.controller.tick_s
+    shorter = [steps * 1e-9 * STEP_NS for steps in range(round(tick * 1e9 / STEP_NS) - 1, 0, -1)]
+    if shorter and (found := peak(tick)) > LARGEST_SENSITIVITY:
+        good = next((each for each in shorter if peak(each) <= LARGEST_SENSITIVITY), None)
+        if good is not None:
+            reason = f"the largest sensitivity of a loop is {found:.2f}, allowed is {LARGEST_SENSITIVITY:g}"
+            yield _problem("controller.tick_s", tick, "s", f"allowed is at most {good:g} s", reason)
 
 
 def _motors(scene: Scene, config: PilotConfig) -> Iterator[str]:

@@ -16,11 +16,12 @@ from ibvs_qp.pilot import Pilot
 from ibvs_qp.vision.overlay import draw_overlay
 from sim.flight.assemble import NUMBERS, OUTCOMES, Flown, LoggedRows, assemble, logged_signals
 from sim.flight.columns import Columns
-from sim.flight.journal import CHUNK_TICKS, Header, Journal
-from sim.flight.options import FlightOptions
+from sim.flight.journal import CHUNK_S, Header, Journal
+from sim.flight.options import FlightOptions, ticks_in
 from sim.flight.pictures import pack_picture
 from sim.flight.surroundings import World
 from sim.flight.trace import Event, Trace
+from sim.world.plant import Plant
 from sim.world.scene import Scene
 
 #: Pictures per second of the video [Hz].
@@ -41,6 +42,11 @@ def program_point(pilot: Pilot) -> np.ndarray | None:
     return pilot.setpoints.step.point if isinstance(pilot.controller, HybridController) else None
 
 
+def truth_signals(plant: Plant) -> dict[str, np.ndarray]:
+    """Signals of the plant that are logged, by name: 1-D views that hold after every tick."""
+    return {"truth": plant.truth, "pushes": plant.pushes, "thrusts_actual": plant.motor_thrusts}
+
+
 class _Kept(NamedTuple):
     """What the journal has."""
 
@@ -55,7 +61,7 @@ class Recorder:
     def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
         self._scene, self._options, self._world, self._pilot = scene, options, world, pilot
         rotors = pilot.config.controller.vehicle.geometry.count
-        signals = controller_signals(pilot) | {"truth": world.plant.truth, "thrusts_actual": world.plant.motor_thrusts}
+        signals = controller_signals(pilot) | truth_signals(world.plant)
         widths = {name: len(view) for name, view in signals.items()}
         widths = dict.fromkeys(NUMBERS, 1) | widths | {"thrusts": rotors, "unallocated": 6}
         self._log = Columns(widths)
@@ -73,6 +79,7 @@ class Recorder:
         self._safety = SafetyState.NOMINAL
         self._logged = self._ticks = 0
         self._journal: Journal | None = None
+        self._chunk = ticks_in(CHUNK_S, pilot.config.controller.tick_s)
         self._kept = _Kept()
         if options.journal:
             scene_text, preset = dump_toml(world.scene), pilot.config.to_toml(derived=True)
@@ -111,7 +118,7 @@ class Recorder:
                 picture = pack_picture(draw_overlay(pilot.picture.rgb, pilot.perception_result))
                 self._pictures.append((time_s, picture, phase))
         self._ticks += 1
-        if self._journal is not None and self._ticks % CHUNK_TICKS == 0:
+        if self._journal is not None and self._ticks % self._chunk == 0:
             self._keep(self._journal)
 
     def _keep(self, journal: Journal) -> None:

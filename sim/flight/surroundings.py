@@ -7,7 +7,7 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.options import FlightOptions, sized
+from sim.flight.options import FlightOptions, sized, ticks_in
 from sim.flight.viewer import FlightViewer
 from sim.sensors.camera_mount import CameraMount
 from sim.sensors.cameras import CameraStream, Dropouts, open_camera
@@ -23,8 +23,8 @@ from sim.world.scene import Scene
 
 #: Normal force above which the brush leaves paint [N].
 PAINTING_FORCE = 0.05
-#: Pressed ticks per drawn stroke: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
-STROKE_TICKS = 3
+#: Time pressed per drawn stroke [s]: 1.2 mm at 0.1 m/s, below the 2 mm between stamps.
+STROKE_S = 0.012
 _SEEN_FROM = [PLACES[name] for name in ("position", "quaternion", "body_velocity", "rate")]
 
 
@@ -36,7 +36,7 @@ class World:
         self.scene, self.geometry = scene, BoardGeometry(scene)
         self._rendered = options.features == "rendered"
         self.stream: CameraStream | None = None
-        self.plant = Plant(scene, config.controller.vehicle, options.seed, options.view)
+        self.plant = Plant(scene, config.controller.vehicle, options.seed, config.controller.tick_s, options.view)
         self.sensors = SensorSuite(scene, self.plant.vehicle, options.seed)
         self.canvas = Canvas(scene, options.seed)
         self._mount = CameraMount(self.plant.vehicle, config.controller.vehicle)
@@ -52,7 +52,7 @@ class World:
         self._seen_from = tuple(self.plant.truth[place] for place in _SEEN_FROM)  # views
         self.viewer = self._open_viewer() if options.view else None
         self._brush: tuple[float, float] | None = None
-        self._pressed = 0
+        self._pressed, self._stroke_ticks = 0, ticks_in(STROKE_S, config.controller.tick_s)
 
     def _open_viewer(self) -> FlightViewer:
         from sim.flight.viewer import FlightViewer
@@ -82,7 +82,7 @@ class World:
             self.viewer.show(pressing)
         if pressing:
             self._pressed += 1
-            if self._brush is not None and self._pressed % STROKE_TICKS:
+            if self._brush is not None and self._pressed % self._stroke_ticks:
                 return
             point = self.geometry.spot(*plant.tip_on_wall)
             self.canvas.stroke(self._brush, point)

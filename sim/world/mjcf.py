@@ -28,8 +28,8 @@ from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 #: Thickness of the board drawn [m].
 BOARD_THICKNESS_M = 0.004
 
-#: Physics steps of 1 ms in one control tick; MuJoCo stores its sensors' samples at each of them.
-STEPS_PER_TICK = 4
+#: A physics step [ns]; MuJoCo stores its sensors' samples at each step of a control tick.
+STEP_NS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ def _surroundings_xml(scene: Scene) -> str:
       contype="0" conaffinity="0"/>"""
 
 
-def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
+def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True) -> str:
     """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
 
     The contact plane is infinite; `sim.world.face` moves it to the surface before the tip.
@@ -128,27 +128,28 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> str:
   {pair_xml("tip", "face")}
   <actuator>{actuators}</actuator>
   <sensor>
-    <accelerometer name="accelerometer" site="imu" nsample="{STEPS_PER_TICK}"/>
-    <force name="force" site="force_torque" nsample="{STEPS_PER_TICK}"/>
-    <torque name="torque" site="force_torque" nsample="{STEPS_PER_TICK}"/>
+    <accelerometer name="accelerometer" site="imu" nsample="{steps}"/>
+    <force name="force" site="force_torque" nsample="{steps}"/>
+    <torque name="torque" site="force_torque" nsample="{steps}"/>
     <contact name="contact" geom1="tip" geom2="face" num="1" data="found force normal tangent"
-      nsample="{STEPS_PER_TICK}"/>
+      nsample="{steps}"/>
   </sensor>
 </mujoco>"""
 
 
-def build_model(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
+def build_model(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
     """Compile the world.
 
     Args:
         scene: Board and wall.
         vehicle: The vehicle that flies.
+        steps: Physics steps in a control tick.
         drawn: Whether to add geometry for display only; the motion is the same to the bit without it.
 
     Raises:
         ConfigError: When the tool alone exceeds the vehicle's inertia.
     """
-    model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, drawn))
+    model = mujoco.MjModel.from_xml_string(build_xml(scene, vehicle, steps, drawn))
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
     # The compiler evens out moments that break the triangle inequality; the plant's numbers are meant literally.
     model.body_inertia[body] = principal_axes(bare_body(vehicle))[0]
@@ -161,6 +162,6 @@ def build_model(scene: Scene, vehicle: TrueVehicle, drawn: bool = True) -> tuple
         start = int(model.sensor_adr[sensor])
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
         # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
-        remembered.append(int(model.sensor_historyadr[sensor]) + 2 + STEPS_PER_TICK)
+        remembered.append(int(model.sensor_historyadr[sensor]) + 2 + steps)
     face = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "face")
     return model, ModelIds(vehicle=body, face=face, **slices, remembered=tuple(remembered))

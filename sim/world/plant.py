@@ -9,6 +9,7 @@ import math
 import mujoco
 import numpy as np
 
+from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.symbolic.function import BoundFunction
 from sim.world.board import BoardGeometry
@@ -16,7 +17,7 @@ from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason, has_landed
 from sim.world.errors import RotorErrors
 from sim.world.face import Face
-from sim.world.mjcf import STEPS_PER_TICK, build_model
+from sim.world.mjcf import STEP_NS, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.world.random_streams import stream
 from sim.world.readings import PlantReadings
@@ -26,9 +27,6 @@ from sim.world.scene import Scene
 from sim.world.trim import hover_thrusts, start_pose
 from sim.world.true_vehicle import true_vehicle
 from sim.world.wind import Wind
-
-#: The control tick in nanoseconds.
-TICK_NS = 4_000_000
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
@@ -50,11 +48,14 @@ class Plant(PlantReadings):
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
         outer_force: Force at the true centre of mass beside that of the air, world NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
+        pushes: Normal contact force at every physics step of the last tick [N], likewise.
+        tick_ns: The control tick [ns].
 
     Args:
         scene: The truth.
         vehicle: What the controller believes; the scene's section ``plant`` and its errors make the true one of it.
         seed: Varies start pose, gusts and errors.
+        tick_s: Control tick, a whole number of physics steps [s].
         drawn: Whether the model holds the geometry that a window shows; the motion is the same to the bit.
     """
 
@@ -63,19 +64,22 @@ class Plant(PlantReadings):
         scene: Scene,
         vehicle: VehicleParams | None = None,
         seed: int = 0,
+        tick_s: float = ControllerConfig.tick_s,
         drawn: bool = True,
     ) -> None:
         self.scene, self.vehicle = scene, true_vehicle(scene, vehicle or VehicleParams(), seed)
-        self.model, self._ids = build_model(scene, self.vehicle, drawn)
+        self._steps = round(tick_s * 1e9) // STEP_NS
+        self.tick_ns = self._steps * STEP_NS
+        self.model, self._ids = build_model(scene, self.vehicle, self._steps, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
         board = BoardGeometry(scene)
         self.clearance = PropellerClearance(board, self.vehicle)
         self._face = Face(board, self.model.geom_pos[self._ids.face])
         drag = self.vehicle.linear_drag_n_s_m
-        self.wind = Wind(scene.wind, drag, TICK_NS * 1e-9, stream(seed, "wind"))
+        self.wind = Wind(scene.wind, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
-        self._factors = ThrustFactors(rotors, count, TICK_NS * 1e-9, seed) if rotors != RotorErrors() else None
+        self._factors = ThrustFactors(rotors, count, self.tick_ns * 1e-9, seed) if rotors != RotorErrors() else None
         self.time_ns = 0
         self.crashed: str | None = None
         self.landed = False
@@ -89,12 +93,12 @@ class Plant(PlantReadings):
         self._act = data.act
         centre = np.array(truth.com_offset_m)
         points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach]))
-        self.truth = np.zeros(SIZE)
+        self.truth, self.pushes = np.zeros(SIZE), np.zeros(self._steps)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
-            readout(model.nhistory, *ids.remembered, STEPS_PER_TICK),
+            readout(model.nhistory, *ids.remembered, self._steps),
             (data.qpos, data.qvel, data.history, points),
-            (self.truth,),
+            (self.truth, self.pushes),
         )
         self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
         self.gain = np.array(np.broadcast_to(truth.thrust_gain, model.nu), float)
@@ -116,17 +120,17 @@ class Plant(PlantReadings):
         ids, sensed, history = self._ids, self.data.sensordata, self.data.history
         for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
             now = sensed[place]
-            history[start : start + STEPS_PER_TICK * len(now)] = np.tile(now, STEPS_PER_TICK)
+            history[start : start + self._steps * len(now)] = np.tile(now, self._steps)
         self._read()
 
     def step(self, thrusts: np.ndarray) -> None:
-        """Advance one control tick of 4 ms under constant commanded thrusts.
+        """Advance one control tick under constant commanded thrusts.
 
         Args:
             thrusts: Commanded thrusts [N], (n,); clipped to the true limits. A non-finite one ends the flight.
         """
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
-            self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + TICK_NS
+            self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + self.tick_ns
             return
         wanted = thrusts * self.gain
         self._wanted[:] = wanted if self._factors is None else wanted * self._factors.next()
@@ -136,8 +140,8 @@ class Plant(PlantReadings):
         self._drive()
         self._lag[:] = self._lags
         struck = self._face.follow(self.truth[_TIP].tolist())
-        mujoco.mj_step(self.model, self.data, STEPS_PER_TICK)
-        self.time_ns += TICK_NS
+        mujoco.mj_step(self.model, self.data, self._steps)
+        self.time_ns += self.tick_ns
         self._read()
         if self.truth.item(_SAFE) != 1.0 and not self.over:
             position, rotation = self.position.tolist(), self.rotation.tolist()

@@ -10,7 +10,7 @@ from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
 from sim.world.true_vehicle import TrueVehicle
 
-_PUSH, _TIP = PLACES["pushes"].stop - 1, PLACES["tip"]
+_PUSH, _TIP = PLACES["push"].start, PLACES["tip"]
 
 
 def _reading(name: str, text: str) -> property:
@@ -23,6 +23,7 @@ class PlantReadings:
     """Pose, motion, forces and contact of a plant, each a copy."""
 
     truth: np.ndarray
+    pushes: np.ndarray
     vehicle: TrueVehicle
     clearance: PropellerClearance
     _act: np.ndarray
@@ -39,7 +40,6 @@ class PlantReadings:
         "ft_wrench",
         "Perfect force/torque sensor: vehicle on tool, in its place and axes, last physics step [N, N m], (6,).",
     )
-    contact_1khz = _reading("pushes", "Normal contact force at the four physics steps of the last tick [N], (4,).")
     contact_friction = _reading("friction", "Force of the board on the tip along it, world NED (y, z) [N], (2,).")
 
     @property

@@ -25,12 +25,13 @@ READINGS = {
     "tip": 3,  # world [m]
     "felt": 3,  # specific force in B, mean of the tick [m/s^2]
     "ft_wrench": 6,  # vehicle on tool, FRD, at the last physics step [N, N m]
-    "pushes": 4,  # normal contact force at every physics step [N]
+    "push": 1,  # normal contact force at the last physics step [N]
     "friction": 2,  # on the tip, world (y, z), at the last physics step [N]
     "safe": 1,  # 1 where no crash is possible
 }
 _STARTS = [sum(list(READINGS.values())[:index]) for index in range(len(READINGS) + 1)]
-#: Slice of each reading; the first four are the motion, 13 numbers.
+#: Slice of each reading; the first four are the motion, 13 numbers. Behind them all stands the normal contact force at
+#: every physics step of the tick [N].
 PLACES = {name: slice(*_STARTS[index : index + 2]) for index, name in enumerate(READINGS)}
 MOTION = slice(0, PLACES["rate"].stop)
 SIZE = _STARTS[-1]
@@ -45,7 +46,7 @@ def _entries(symbol: ca.SX) -> list[Any]:
 
 @functools.lru_cache(maxsize=8)
 def readout(size: int, accelerometer: int, force: int, torque: int, contact: int, steps: int) -> ca.Function:
-    """Function of (qpos, qvel, history, points) yielding `READINGS`.
+    """Function of (qpos, qvel, history, points) yielding `READINGS` and the push at every physics step, in two arrays.
 
     Args:
         size: Numbers of ``history``, MuJoCo's sensor samples at every physics step.
@@ -98,12 +99,13 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
         "tip": [a + b for a, b in zip(position, rotate(rotation, tip), strict=True)],
         "felt": (fraction * felt[0], -fraction * felt[1], -fraction * felt[2]),
         "ft_wrench": (fx, -fy, -fz, mx, -my, -mz),
-        "pushes": pushes,
+        "push": (pushes[-1],),
         "friction": friction,
         "safe": (safe,),
     }
     row = ca.vertcat(*(entry for name in READINGS for entry in values[name]))
-    return ca.Function("readout", [place, speed, history, points], [ca.densify(row)])
+    results = [ca.densify(row), ca.densify(ca.vertcat(*pushes))]
+    return ca.Function("readout", [place, speed, history, points], results)
 
 
 @functools.lru_cache(maxsize=8)

@@ -10,7 +10,6 @@ from ibvs_qp.command import SafetyState
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.evaluate.window import CONTACT_N, contact_clock, event_time, peak, tilt_deg
 from sim.flight.trace import CRASH, LANDED, Trace
-from sim.world.mjcf import STEPS_PER_TICK
 
 #: States of the supervisor in the order of severity; a figure holds a state as its place in this list.
 STATES = tuple(SafetyState)
@@ -37,7 +36,7 @@ def fault_figures(trace: Trace) -> dict[str, float]:
     fault = event_time(trace, "fault")
     if not len(trace.t):
         return {"struck": 0.0}
-    touching = trace.contact_1khz.reshape(-1, STEPS_PER_TICK).max(axis=1) > CONTACT_N
+    touching = trace.contact_1khz.reshape(len(trace.t), -1).max(axis=1) > CONTACT_N
     tilt, flown = tilt_deg(trace), trace.t >= SETTLED_S
     after = trace.t >= fault if not math.isnan(fault) else np.zeros(len(trace.t), bool)
     origin = trace.position[after][:1]

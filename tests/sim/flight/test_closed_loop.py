@@ -10,6 +10,7 @@ from closed_loop_rigs import fly_geometric, hold, short_scene, wall
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
+from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.world.plant_scene import PlantScene
@@ -76,9 +77,25 @@ def test_same_seed_same_thrusts_to_the_bit() -> None:
     assert first.thrusts.shape != other.thrusts.shape or not np.array_equal(first.thrusts, other.thrusts)
 
 
-def test_a_controller_of_another_period_is_not_flown() -> None:
-    """Its thrust window would allow a rate that is not the vehicle's."""
+def with_period(tick_s: float) -> PilotConfig:
     config = PilotConfig()
-    config = dataclasses.replace(config, controller=dataclasses.replace(config.controller, tick_s=0.002))
-    with pytest.raises(ConfigError, match=r"controller\.tick_s = 0\.002 s is refused: the simulated loop ticks every"):
-        fly(short_scene(), FlightOptions(law="qp", features="geometric"), config=config)
+    return dataclasses.replace(config, controller=dataclasses.replace(config.controller, tick_s=tick_s))
+
+
+@pytest.mark.parametrize("tick_s", [0.0025, 0.0005, 0.012])
+def test_a_period_of_no_whole_physics_steps_is_refused(tick_s: float) -> None:
+    with pytest.raises(
+        ConfigError, match=rf"controller\.tick_s = {tick_s} s is refused: the simulated loop ticks every"
+    ):
+        fly(short_scene(), FlightOptions(law="qp", features="geometric"), config=with_period(tick_s))
+
+
+@pytest.mark.parametrize("steps", [2, 5])
+def test_the_loop_ticks_at_the_controllers_period(steps: int) -> None:
+    scene = short_scene(stroke_m=0.2, rows=1)
+    scene = dataclasses.replace(scene, imu=dataclasses.replace(scene.imu, rate_hz=500.0))
+    trace = fly(scene, FlightOptions(features="geometric", video=False), config=with_period(1e-3 * steps))
+    assert trace.claimed, trace.reason
+    np.testing.assert_allclose(np.diff(trace.t), 1e-3 * steps, atol=1e-12)
+    assert len(trace.contact_1khz) == len(trace.painting_1khz) == steps * len(trace.t)
+    assert compute_metrics(trace)["completed"]

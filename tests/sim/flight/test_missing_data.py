@@ -14,7 +14,6 @@ from sim.flight.closed_loop import make_pilot
 from sim.flight.jobs import PaintJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
-from sim.world.readout import PLACES
 from sim.world.worlds import in_world
 
 SCENE = in_world(short_job(0.7, rows=1), "datasheet")
@@ -87,7 +86,7 @@ def test_a_board_before_the_seen_wall_is_pressed_softly() -> None:
     largest = 0.0
     while pilot.painter.phase != "paint" and pilot.supervision.state == "nominal":
         world.act(pilot.step(behind(world.sense())).thrusts)
-        largest = max(largest, float(world.plant.truth[PLACES["pushes"]].max()))
+        largest = max(largest, float(world.plant.pushes.max()))
     world.close()
     print(f"largest push {largest:.1f} N, offset {1e3 * pilot.contact.surface_offset:.0f} mm")
     assert pilot.painter.phase == "paint" and pilot.contact.state.in_contact

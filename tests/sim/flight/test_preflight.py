@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -32,6 +33,18 @@ BIG = BoardScene(width_m=4.0, height_m=1.5)
 def problems(scene: Scene, features: str = "geometric", world: str = "datasheet") -> list[str]:
     scene = in_world(scene, world)
     return job_problems(scene, pilot_config(scene, FlightOptions(features=features)), features)
+
+
+def test_a_period_that_takes_the_margin_of_a_loop_is_refused() -> None:
+    def found(tick_s: float) -> list[str]:
+        config = pilot_config(Scene(), FlightOptions(features="geometric"))
+        return job_problems(Scene(), replace(config, controller=replace(config.controller, tick_s=tick_s)), "geometric")
+
+    assert found(0.008) == []
+    assert found(0.010) == [
+        "controller.tick_s = 0.01 s is refused: allowed is at most 0.008 s: "
+        "the largest sensitivity of a loop is 2.11, allowed is 2"
+    ]
 
 
 def paint(board: BoardScene | None = None, **keys: Any) -> Scene:

@@ -41,7 +41,7 @@ def test_tip_beside_the_board_meets_the_wall_and_not_the_board(edge, outward):
     ):
         move(plant, np.array(edge) + beyond * np.array(outward), depth)
         assert plant.on_board == (beyond < 0.0) and plant.crashed is None
-        assert plant.contact_1khz[0] == pytest.approx(stiffness * push, rel=0.02, abs=1e-9)
+        assert plant.pushes[0] == pytest.approx(stiffness * push, rel=0.02, abs=1e-9)
 
 
 @pytest.mark.parametrize(("deeper", "struck"), [(0.9 * TIP_RADIUS_M, False), (1.1 * TIP_RADIUS_M, True)])

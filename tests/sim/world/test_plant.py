@@ -12,7 +12,6 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, skew
 from sim.world.board import BoardGeometry
-from sim.world.mjcf import STEPS_PER_TICK
 from sim.world.mujoco_frames import FLIP
 from sim.world.plant import TICK_NS, Plant
 from sim.world.plant_scene import PlantScene
@@ -168,7 +167,7 @@ def test_same_seed_same_bits():
         rng, trace = np.random.default_rng(7), []
         for _ in range(300):
             plant.step(plant.thrusts_actual + B[0] + rng.normal(size=6) * 0.2)
-            state = (plant.position, plant.quaternion, plant.velocity, plant.ft_wrench, plant.contact_1khz)
+            state = (plant.position, plant.quaternion, plant.velocity, plant.ft_wrench, plant.pushes)
             trace.append(np.concatenate(state))
         assert np.array(trace)[:, -4:].max() > 0.0, "touched the board"
         return np.array(trace).tobytes()
@@ -184,7 +183,7 @@ def test_contact_reads_zero_in_free_air_and_friction_opposes_the_slide():
     plant.data.qvel[:3] = FLIP * [0.0, 0.1, 0.05]
     plant._read()
     plant.step(plant.thrusts_actual)
-    assert plant.contact_normal_force > 5.0 and plant.contact_1khz[-1] == plant.contact_normal_force
+    assert plant.contact_normal_force > 5.0 and plant.pushes[-1] == plant.contact_normal_force
     friction = plant.contact_friction
     assert friction[0] < 0.0 and friction[1] < 0.0
     assert np.linalg.norm(friction) == pytest.approx(0.3 * plant.contact_normal_force, rel=0.01)
@@ -203,14 +202,14 @@ def test_forces_of_a_tick_are_those_of_its_physics_steps_in_order():
         single._drive()
         single._lag[:] = single._lags
         felt, pushes = [], []
-        for _ in range(STEPS_PER_TICK):
+        for _ in range(len(single.pushes)):
             mujoco.mj_step(single.model, single.data)
             felt.append(single.data.sensordata[single._ids.accelerometer].copy())
             found, push, *_ = single.data.sensordata[single._ids.contact]
             pushes.append(push if found else 0.0)
         single._read()
         np.testing.assert_array_equal(plant.truth, single.truth)
-        np.testing.assert_allclose(plant.contact_1khz, pushes, atol=1e-12)
+        np.testing.assert_allclose(plant.pushes, pushes, atol=1e-12)
         np.testing.assert_allclose(FLIP * np.mean(felt, axis=0), plant.specific_force, atol=1e-12)
 
 
