@@ -14,7 +14,7 @@ from ibvs_qp.painting.command import ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.painting.navigation import Navigation
 from ibvs_qp.painting.speed import approached, climb_speed, ramped, stroke_speed
 from ibvs_qp.painting.standstill import STOP_DISTANCE, Alignment, StrokeEnd
-from ibvs_qp.painting.strategy import PHASES, RETREAT_REACHED, Strategy
+from ibvs_qp.painting.strategy import RETREAT_REACHED, Strategy
 from ibvs_qp.painting.stroke import Stroke
 
 #: Difference from the stand-off at which the approach ends [m]; distance from the beginning of a stroke within which
@@ -46,7 +46,6 @@ class Painter(Strategy):
     def reset(self) -> None:
         """As after construction."""
         super().reset()
-        self._phases = {phase: getattr(self, f"_{phase}") for phase in PHASES}
         self._tip = tip = Navigation(self.config)
         self._stroke = Stroke(self.config, tip.cross, tip.along, number=1, place=self.config.edge_margin_m)
         self._alignment, self._stroke_end = Alignment(self.config), StrokeEnd(self.config)
@@ -65,7 +64,7 @@ class Painter(Strategy):
         self.log += self._tip.update(inputs, dt, self.phase, self._stroke)
         if inputs.time_s - self.entered > self.config.timeout_s + self._way_s and self.phase not in _UNTIMED:
             self._time_out(inputs)
-        return self._phases[self.phase](inputs, dt)
+        return getattr(self, f"_{self.phase}")(inputs, dt)
 
     def expected_edge(self) -> ExpectedEdge | None:
         """The painted edge to look for: the last stroke's outer one, ahead; for stroke 1 its own, behind the brush.

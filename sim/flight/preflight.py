@@ -13,9 +13,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from allocation import WrenchFacets, worst_level_reach
+from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.config.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.frames import GRAVITY, rotation_from_vector
 from ibvs_qp.painting.pattern import PLACE_TOLERANCE_M, ROWS
 from ibvs_qp.pilot import PilotConfig

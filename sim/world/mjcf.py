@@ -137,7 +137,9 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
 </mujoco>"""
 
 
-def build_model(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True) -> tuple[mujoco.MjModel, ModelIds]:
+def build_model(
+    scene: Scene, vehicle: TrueVehicle, steps: int = 1, drawn: bool = True
+) -> tuple[mujoco.MjModel, ModelIds]:
     """Compile the world.
 
     Args:
