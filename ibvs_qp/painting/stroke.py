@@ -96,7 +96,8 @@ class Stroke:
     def goal(self) -> float:
         """Where the stroke ends, u [m].
 
-        Half the error of its beginning is made up for there, and the paint that a gust laid before it.
+        Half the error of its beginning is made up for there, and the paint that a gust laid before it, together at most
+        `MOST_END_SHIFT_M`.
         """
         goal = self.config.stroke_m if self.travel > 0.0 else self.along.begin
         error = self.along.began - self.begin
