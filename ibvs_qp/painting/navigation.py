@@ -120,7 +120,8 @@ class Navigation(PhaseMachine):
     def _stroke_goal(self) -> float:
         """Where the stroke in progress ends, u [m].
 
-        Half the error of its beginning is made up for there, and the paint that a gust laid before it.
+        Half the error of its beginning is made up for there, and the paint that a gust laid before it, together at most
+        `MOST_END_SHIFT_M`.
         """
         goal = self.config.stroke_m if self.pattern.travel(self.row) > 0.0 else self._along.begin
         error = self._along.began - self._stroke_begin()
