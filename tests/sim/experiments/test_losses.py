@@ -124,3 +124,23 @@ def test_the_times_are_those_of_every_law_in_its_own_slide(monkeypatch: pytest.M
     assert step_times() == [(*name, f"{100 * (place + 1)}") for place, name in enumerate(names)]
     assert [(law, rival) for law, rival, _ in flown] == [("paper", "")] * 4 + [("qp", "mpc"), ("qp", "")]
     assert len({seed for *_, seed in flown}) == 1
+
+
+def test_the_page_counts_what_the_table_of_flights_has() -> None:
+    folder = Path(__file__).parents[3] / "docs/experiments"
+    found = comparisons(pl.read_parquet(folder / "losses.parquet"))
+    page = (folder / "comparisons.md").read_text(encoding="utf-8")
+    lost = [each for each in found if each.outcome is Outcome.LOST]
+    assert f"{len(lost)} of {len(found):,} are lost" in page
+    headings = [line for line in page.splitlines() if line.startswith("## ") and " lost" in line]
+    words = ("beyond the reach", "rotor", "thrust rate", "touch")
+    counts = [sum(_mechanism(each) == word for each in lost) for word in words]
+    assert [int(heading.split(": ")[1].split()[0]) for heading in headings] == counts
+
+
+def _mechanism(lost: Comparison) -> str:
+    if "no-reach-check" in lost.opponent:
+        return "beyond the reach"
+    if "rotor lost" in lost.params.values() or "loss" in lost.params.values():
+        return "rotor"
+    return "thrust rate" if "thrust rate" in lost.words else "touch"
