@@ -7,6 +7,7 @@ A message with a number that is not finite, or whose sender marks the quantity a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ibvs_qp.ros.messages import (
     header,
     message,
 )
+from ibvs_qp.ros.topics import Topics
 
 #: Largest difference of a quaternion's length from 1 [-].
 LENGTH_ERROR = 0.01
@@ -92,6 +94,18 @@ def to_wrench(stamp_ns: int, vector: np.ndarray, axes: str, on: str) -> Any:
     vector = _convention(np.asarray(vector, float), axes, on)
     value = message("geometry_msgs/msg/Wrench", force=_vector3(vector[:3]), torque=_vector3(vector[3:]))
     return message(WRENCH, header=header(stamp_ns, "force_torque"), wrench=value)
+
+
+#: Sample of a message of every role.
+READERS: dict[str, Callable[[Any, Topics], Sample]] = {
+    "imu": lambda value, topics: inertial(value),
+    "attitude": lambda value, topics: attitude(value),
+    "wrench": lambda value, topics: wrench(value, topics.wrench_axes, topics.wrench_on),
+}
+#: Message of a channel of a frame by its role and its time, beside those of the IMU.
+WRITERS: dict[str, Callable[[int, Any, Topics], Any]] = {
+    "wrench": lambda stamp_ns, vector, topics: to_wrench(stamp_ns, vector, topics.wrench_axes, topics.wrench_on),
+}
 
 
 def _convention(vector: np.ndarray, axes: str, on: str) -> np.ndarray:

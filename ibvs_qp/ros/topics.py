@@ -18,8 +18,11 @@ ACCEPTED = {
     "depth": (IMAGE,),
     "camera_info": (CAMERA_INFO,),
 }
-#: Topics of pictures, and of everything else that a frame needs.
+#: Topics of pictures; of everything else that a frame needs, and that it may have.
 CAMERA, MOTION = ("color", "depth", "camera_info"), ("imu", "attitude", "wrench")
+SAMPLES = tuple([role for role in ACCEPTED if role not in CAMERA])
+#: Topics without which a frame is complete, or whose quantity comes with another one: their names may be empty.
+OPTIONAL = ("attitude", *[role for role in SAMPLES if role not in MOTION])
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -61,11 +64,11 @@ class Topics:
         """Validate numbers, choices and names."""
         validate(self)
         for role in ACCEPTED:
-            if getattr(self, role) or role != "attitude":
+            if getattr(self, role) or role not in OPTIONAL:
                 check_name(role, getattr(self, role))
 
     def names(self, roles: tuple[str, ...]) -> dict[str, str]:
-        """Topics by role; without attitude where the IMU's messages have it."""
+        """Topics by role; without those whose name is empty."""
         return {role: name for role in roles if (name := getattr(self, role))}
 
 
