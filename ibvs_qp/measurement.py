@@ -275,6 +275,8 @@ class SensorFrame:
         features: Result of perception on a new image, instead of it, or None.
         attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
         imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.
+        height_rate: Rate of climb by a barometer's vertical-speed filter [m/s], positive upwards, or None.
+        height_rate_stamp_ns: Time for which the rate of climb holds, or None: at the tick.
     """
 
     stamp_ns: int
@@ -287,3 +289,14 @@ class SensorFrame:
     features: FeatureFrame | None = channel(axes="frame", **_PICTURE)
     attitude_stamp_ns: int | None = None
     imu_stamp_ns: int | None = None
+    height_rate: float | None = channel(
+        bound=20.0,
+        unit="m/s",
+        default=None,
+        held=False,
+        stamp="height_rate_stamp_ns",
+        rate_hz=25.0,
+        latency_s=0.04,
+        oldest_s=0.2,
+    )
+    height_rate_stamp_ns: int | None = None

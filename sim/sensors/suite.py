@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
+from sim.sensors.barometer import Barometer
 from sim.sensors.force_torque import ForceTorque
 from sim.sensors.imu import Imu
 from sim.world.plant import Plant
@@ -39,7 +40,9 @@ class SensorSuite:
         self.vehicle = vehicle or VehicleParams()
         self.imu = Imu(scene.imu, scene.errors, seed)
         self.force_torque = ForceTorque(scene.force_torque, scene.errors.force_torque, self.vehicle, seed)
-        self.models: tuple[SensorModel, ...] = (self.imu, self.force_torque)
+        self.models: list[SensorModel] = [self.imu, self.force_torque]
+        if scene.barometer.fitted:
+            self.models.append(Barometer(scene.barometer, seed))
 
     def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
         """What the vehicle delivers at this control tick, with the picture or the features that are due."""

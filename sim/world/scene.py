@@ -15,6 +15,7 @@ Color = tuple[int, int, int]
 #: Nominal rates and delays of the sensors.
 _SENSORS = channels(SensorFrame)
 _IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
+_CLIMB = _SENSORS["height_rate"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +113,20 @@ class ImuScene(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
+class BarometerScene(Checked):
+    """A barometer with a vertical-speed filter; none by default."""
+
+    fitted: bool = setting(False, "the vehicle has one")
+    rate_hz: float = setting(_CLIMB.rate_hz, "sample rate", unit="Hz", low=1.0, high=250.0)
+    sigma_m_s: float = setting(0.05, "noise of the rate of climb per sample", unit="m/s", low=0.0, high=5.0)
+    wander_m_s: float = setting(
+        0.05, "slow error by the rotors' wash, standard deviation", unit="m/s", low=0.0, high=5.0
+    )
+    wander_time_s: float = setting(1.0, "correlation time of the slow error", unit="s", low=0.1, high=100.0)
+    latency_s: float = setting(_CLIMB.latency_s, "sampling to delivery", unit="s", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class FeaturesScene(Checked):
     """Extra noise on line features, after vision; not part of the reported covariance."""
 
@@ -138,6 +153,7 @@ class Scene(Checked):
     camera: CameraScene = field(default_factory=CameraScene)
     force_torque: ForceTorqueScene = field(default_factory=ForceTorqueScene)
     imu: ImuScene = field(default_factory=ImuScene)
+    barometer: BarometerScene = field(default_factory=BarometerScene)
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
     errors: WorldErrors = field(default_factory=WorldErrors)
