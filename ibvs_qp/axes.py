@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ibvs_qp.command import Command
-from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, SensorFrame
+from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, SensorFrame, channels
 
 Value = TypeVar("Value", Measurement, SensorFrame, FeatureFrame, Reference, Command)
 #: Signs of a vector in B: front stays, left is minus right, up is minus down; and of roll and pitch.
@@ -68,24 +68,19 @@ def swap_axes(value: Value) -> Value:
     Raises:
         TypeError: For a value of another type.
     """
-    match value:
-        case Measurement():
-            vectors = ("angular_velocity", "specific_force", "contact_wrench", "velocity", "acceleration_bias")
-            return _changed(value, vectors, attitude=swap_attitude, velocity_covariance=swap_covariance)
-        case SensorFrame():
-            vectors = ("angular_velocity", "specific_force", "wrench")
-            return _changed(value, vectors, attitude=swap_attitude, features=swap_axes)
-        case FeatureFrame():
-            return _changed(value, ("velocity",), velocity_covariance=swap_covariance)
-        case Reference():
-            return _changed(value, (), tilt=_ANGLES.__mul__, trim=_ANGLES.__mul__)
-        case Command():
-            return _changed(value, ("wrench", "unallocated_wrench"))
+    if isinstance(value, Command):
+        return _changed(value, {"wrench": "vector", "unallocated_wrench": "vector"})
+    for kind in (Measurement, SensorFrame, FeatureFrame, Reference):
+        if isinstance(value, kind):
+            return _changed(value, {name: each.axes for name, each in channels(kind).items() if each.axes})
     raise TypeError(f"{type(value).__name__} has no axes to swap")
 
 
-def _changed(value: Any, vectors: tuple[str, ...], **others: Any) -> Any:
-    """Copy with vectors swapped and ``others`` replaced by a function of the old value; None stays None."""
-    swapped = {name: swap_vector(old) for name in vectors if (old := getattr(value, name)) is not None}
-    more = {name: swap(old) for name, swap in others.items() if (old := getattr(value, name)) is not None}
-    return dataclasses.replace(value, **swapped, **more)
+def _changed(value: Any, axes: dict[str, str]) -> Any:
+    """Copy with the named fields in the other axes, by `Channel.axes`; None stays None."""
+    swaps = {"vector": swap_vector, "attitude": swap_attitude, "covariance": swap_covariance}
+    swaps |= {"angles": _ANGLES.__mul__, "frame": swap_axes}
+    old = {name: getattr(value, name) for name in axes}
+    return dataclasses.replace(
+        value, **{name: swaps[axes[name]](each) for name, each in old.items() if each is not None}
+    )

@@ -1,16 +1,114 @@
 """Inputs: sensor frames for the pilot, measurements and references for a controller.
 
 All are frozen keyword-only dataclasses in float64 and SI units; stamps are integer nanoseconds of one monotonic
-clock. They are plain carriers: a controller checks them itself, because no step may raise in flight.
+clock. They are plain carriers: a controller checks them itself, because no step may raise in flight. A field states
+its unit, shape, bounds and times once (`Channel`): gates, logs, ROS topics, sensor models, faults and docs/sensors.md
+read them there.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 import numpy as np
 
+from ibvs_qp.frames import GRAVITY
+
 HORIZONTAL, VERTICAL = "horizontal", "vertical"
+#: Length of a vector with one entry a rotor.
+ROTORS = -1
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What one field of an input carries.
+
+    Attributes:
+        name: The field.
+        shape: Of its float array; empty for a plain number.
+        low: Smallest value of an entry; entries of a channel without bounds have checks of their own.
+        high: Largest value of an entry.
+        unit: Unit of entries and bounds.
+        fallback: Entries in force until an input was accepted; empty for None.
+        held: Whether the last accepted value stays in force where one is refused; None replaces it otherwise.
+        optional: Whether None is accepted.
+        unit_length: Whether the vector must have length 1.
+        axes: How it changes with the axes of B: "vector" (of three, or a wrench), "attitude", "covariance", "angles"
+            (roll, pitch), "frame" (a dataclass with such fields); empty for not at all.
+        stamp: Field with the time of its sample; empty for the time of the tick.
+        rate_hz: Nominal rate [Hz]; 0 for every tick.
+        latency_s: Nominal time from sample to delivery [s].
+        oldest_s: Greatest age in use [s]: an older value that is not held is refused, of others the supervisor decides.
+    """
+
+    name: str = ""
+    shape: tuple[int, ...] = ()
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    fallback: tuple[float, ...] = ()
+    held: bool = True
+    optional: bool = False
+    unit_length: bool = False
+    axes: str = ""
+    stamp: str = ""
+    rate_hz: float = 0.0
+    latency_s: float = 0.0
+    oldest_s: float = math.inf
+
+
+def channel(*shape: int, bound: float = math.inf, default: Any = dataclasses.MISSING, **more: Any) -> Any:
+    """A field of a dataclass with its `Channel`.
+
+    Args:
+        shape: Of its array; none for a number.
+        bound: Largest size of an entry, where ``low`` and ``high`` are not given.
+        default: Of the field; a tuple or an array is copied for every instance.
+        more: Further attributes of the `Channel`.
+    """
+    metadata = {"channel": Channel(**{"shape": shape, "low": -bound, "high": bound, **more})}
+    if isinstance(default, np.ndarray):
+        return field(default_factory=default.copy, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+@cache
+def channels(kind: type) -> dict[str, Channel]:
+    """Channels of a dataclass by the names of its fields, in their order."""
+    return {
+        each.name: dataclasses.replace(each.metadata["channel"], name=each.name, optional=each.default is None)
+        for each in dataclasses.fields(kind)
+        if "channel" in each.metadata
+    }
+
+
+#: Channels that several inputs have: attitude and gyro; velocity; speed and tilt in the wall plane.
+_ATTITUDE: dict[str, Any] = {
+    "bound": 1.01, "unit": "-", "fallback": (1.0, 0.0, 0.0, 0.0), "unit_length": True,
+    "axes": "attitude", "stamp": "attitude_stamp_ns", "rate_hz": 250.0, "oldest_s": 0.02,
+}  # fmt: skip
+_INERTIAL: dict[str, Any] = {
+    "axes": "vector", "stamp": "imu_stamp_ns", "rate_hz": 250.0, "oldest_s": 0.02,
+}  # fmt: skip
+_RATE: dict[str, Any] = {"bound": 35.0, "unit": "rad/s", "fallback": (0.0,) * 3, **_INERTIAL}
+_FORCE: dict[str, Any] = {"bound": 200.0, "unit": "m/s^2", **_INERTIAL}
+_WRENCH: dict[str, Any] = {
+    "bound": 500.0, "unit": "N or N m", "fallback": (0.0,) * 6, "axes": "vector", "stamp": "wrench_stamp_ns",
+    "rate_hz": 100.0, "latency_s": 0.004, "oldest_s": 0.03,
+}  # fmt: skip
+_PICTURE: dict[str, Any] = {"default": None, "rate_hz": 30.0, "latency_s": 0.060, "oldest_s": 0.3}
+_VELOCITY: dict[str, Any] = {
+    "bound": 20.0, "unit": "m/s", "default": None, "held": False, "axes": "vector", "stamp": "velocity_stamp_ns",
+    "oldest_s": 0.3,
+}  # fmt: skip
+_COVARIANCE: dict[str, Any] = {"default": None, "axes": "covariance", "unit": "m^2/s^2"}
+_THRUSTS: dict[str, Any] = {"bound": 1e4, "unit": "N", "default": None}
+_STILL: dict[str, Any] = {"bound": 20.0, "unit": "m/s", "default": np.zeros(2)}
+_LEVEL: dict[str, Any] = {"bound": 0.6, "unit": "rad", "default": np.zeros(2), "axes": "angles"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,12 +131,12 @@ class LineFeature:
 
     rho: float
     theta: float
-    covariance: np.ndarray
+    covariance: np.ndarray = channel(2, 2)
     role: str
     weight: float = 1.0
     stamp_ns: int = 0
     track_id: int = 0
-    segment: np.ndarray | None = None
+    segment: np.ndarray | None = channel(2, 2, default=None)
     surface_side: int = 0
     kind: str = ""
 
@@ -79,19 +177,19 @@ class Measurement:
     """
 
     stamp_ns: int
-    attitude: np.ndarray
-    angular_velocity: np.ndarray
-    contact_wrench: np.ndarray
+    attitude: np.ndarray = channel(4, **_ATTITUDE)
+    angular_velocity: np.ndarray = channel(3, **_RATE)
+    contact_wrench: np.ndarray = channel(6, **_WRENCH)
     wrench_stamp_ns: int
-    specific_force: np.ndarray | None = None
-    lines: tuple[LineFeature, ...] = ()
+    specific_force: np.ndarray | None = channel(3, default=None, held=False, **_FORCE)
+    lines: tuple[LineFeature, ...] = channel(default=(), oldest_s=0.3)
     plane: tuple[float, float, float, float] | None = None
     plane_stamp_ns: int = 0
-    velocity: np.ndarray | None = None
-    velocity_covariance: np.ndarray | None = None
-    acceleration_bias: np.ndarray | None = None
-    thrust_min: np.ndarray | None = None
-    thrust_max: np.ndarray | None = None
+    velocity: np.ndarray | None = channel(3, **_VELOCITY)
+    velocity_covariance: np.ndarray | None = channel(3, 3, **_COVARIANCE)
+    acceleration_bias: np.ndarray | None = channel(3, bound=5.0, unit="m/s^2", default=None, held=False, axes="vector")
+    thrust_min: np.ndarray | None = channel(ROTORS, **_THRUSTS)
+    thrust_max: np.ndarray | None = channel(ROTORS, **_THRUSTS)
     attitude_stamp_ns: int | None = None
     imu_stamp_ns: int | None = None
     velocity_stamp_ns: int | None = None
@@ -114,14 +212,14 @@ class Reference:
             controlled like a level one.
     """
 
-    push_force: float = 0.0
-    standoff: float = 0.3
+    push_force: float = channel(low=0.0, high=1e3, unit="N", default=0.0)
+    standoff: float = channel(low=-1.0, high=10.0, unit="m", default=0.3)
     lines: tuple[LineReference, ...] = ()
-    velocity: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    velocity: np.ndarray = channel(2, **_STILL)
     contact: bool = False
-    tilt: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    travel: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    trim: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    tilt: np.ndarray = channel(2, **_LEVEL)
+    travel: np.ndarray = channel(2, **_STILL)
+    trim: np.ndarray = channel(2, **_LEVEL)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,8 +255,8 @@ class FeatureFrame:
     lines: tuple[LineFeature, ...]
     plane: tuple[float, float, float, float] | None
     stamp_ns: int
-    velocity: np.ndarray | None = None
-    velocity_covariance: np.ndarray | None = None
+    velocity: np.ndarray | None = channel(3, **_VELOCITY)
+    velocity_covariance: np.ndarray | None = channel(3, 3, **_COVARIANCE)
     velocity_stamp_ns: int = 0
 
 
@@ -167,25 +265,38 @@ class SensorFrame:
     """Raw sensors at one control tick, as a vehicle delivers them.
 
     Attributes:
-        stamp_ns: Time of the tick.
+        stamp_ns: Time of the tick; increases. A step above 1 s is a leap, and is followed within 0.5 s.
         attitude: Quaternion (w, x, y, z) of B in I; its yaw is arbitrary.
         angular_velocity: Gyro in B [rad/s], (3,).
-        specific_force: Accelerometer in B [m/s^2], (3,).
-        wrench: Raw F/T sample at the sensor, FRD axes, vehicle on tool [N, N m], (6,).
+        specific_force: Accelerometer in B at the centre of mass [m/s^2], (3,); at rest (0, 0, -9.81).
+        wrench: Raw F/T sample at the sensor in its axes, vehicle on tool: a push reads +x [N, N m], (6,).
         wrench_stamp_ns: Time at which that sample was taken.
         image: A new image, or None.
-        features: Result of perception instead of an image, or None.
+        features: Result of perception on a new image, instead of it, or None.
         attitude_stamp_ns: Time for which the attitude holds, or None: at the tick.
         imu_stamp_ns: Time at which gyro and accelerometer were sampled, or None: at the tick.
+        height_rate: Rate of climb by a barometer's vertical-speed filter [m/s], positive upwards, or None.
+        height_rate_stamp_ns: Time for which the rate of climb holds, or None: at the tick.
     """
 
     stamp_ns: int
-    attitude: np.ndarray
-    angular_velocity: np.ndarray
-    specific_force: np.ndarray
-    wrench: np.ndarray
+    attitude: np.ndarray = channel(4, **_ATTITUDE)
+    angular_velocity: np.ndarray = channel(3, **_RATE)
+    specific_force: np.ndarray = channel(3, fallback=(0.0, 0.0, -GRAVITY), **_FORCE)
+    wrench: np.ndarray = channel(6, **_WRENCH)
     wrench_stamp_ns: int
-    image: RgbdFrame | None = None
-    features: FeatureFrame | None = None
+    image: RgbdFrame | None = channel(**_PICTURE)
+    features: FeatureFrame | None = channel(axes="frame", **_PICTURE)
     attitude_stamp_ns: int | None = None
     imu_stamp_ns: int | None = None
+    height_rate: float | None = channel(
+        bound=20.0,
+        unit="m/s",
+        default=None,
+        held=False,
+        stamp="height_rate_stamp_ns",
+        rate_hz=25.0,
+        latency_s=0.04,
+        oldest_s=0.2,
+    )
+    height_rate_stamp_ns: int | None = None

@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import PICTURE_DEPTH, SAMPLE_DEPTH, Participant
 from ibvs_qp.ros.held import HeldSamples
-from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, WRENCH, BadMessage, decoded, from_px4
-from ibvs_qp.ros.topics import CAMERA, MOTION
+from ibvs_qp.ros.messages import IMAGE, BadMessage, decoded, from_px4
+from ibvs_qp.ros.topics import ACCEPTED
 
 CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
 #: Roles beside those of `ibvs_qp.ros.topics.ACCEPTED`: PX4's mode, and a colour picture with its depth.
@@ -57,9 +57,9 @@ class Subscription(NamedTuple):
 
 def subscriptions(config: BridgeConfig) -> tuple[Subscription, ...]:
     """Topics that the bridge reads."""
-    types = {"imu": config.imu_type, "attitude": config.attitude_type, "wrench": WRENCH, "camera_info": CAMERA_INFO}
-    types |= {"color": IMAGE, "depth": IMAGE, MODE: CONTROL_MODE}
-    names = config.topics.names((*MOTION, *CAMERA)) | {MODE: "/fmu/out/vehicle_control_mode"}
+    types = {role: accepted[0] for role, accepted in ACCEPTED.items()}
+    types |= {"imu": config.imu_type, "attitude": config.attitude_type, MODE: CONTROL_MODE}
+    names = config.topics.names(tuple(ACCEPTED)) | {MODE: "/fmu/out/vehicle_control_mode"}
     return tuple(
         Subscription(
             role,

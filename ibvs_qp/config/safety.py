@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ibvs_qp.config.settings import Checked, setting
+from ibvs_qp.measurement import SensorFrame, channels
+
+_ATTITUDE, _WRENCH = (channels(SensorFrame)[name] for name in ("attitude", "wrench"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +31,10 @@ class SafetySettings(Checked):
     first_picture_s: float = setting(3.0, "latest first image and wall plane", "s", 0.1, 600.0)
     plane_age_s: float = setting(0.3, "oldest wall plane", "s", 0.05, 5.0)
     lines_age_s: float = setting(0.5, "oldest image with a line", "s", 0.1, 10.0)
-    wrench_age_s: float = setting(0.03, "oldest force sample: three periods at 100 Hz", "s", 0.005, 1.0)
-    imu_age_s: float = setting(0.02, "oldest attitude, gyro or accelerometer: five ticks", "s", 0.002, 0.5)
+    wrench_age_s: float = setting(_WRENCH.oldest_s, "oldest force sample: three periods at 100 Hz", "s", 0.005, 1.0)
+    imu_age_s: float = setting(
+        _ATTITUDE.oldest_s, "oldest attitude, gyro or accelerometer: five ticks", "s", 0.002, 0.5
+    )
     frozen_samples: int = setting(10, "equal force samples in a row, of a sensor with noise: 0.1 s", low=3, high=1000)
     frozen_pictures: int = setting(4, "the same of images: 0.13 s", low=2, high=1000)
     frozen_imu_samples: int = setting(6, "the same of inertial samples: 24 ms", low=3, high=1000)

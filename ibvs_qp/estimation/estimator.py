@@ -63,6 +63,9 @@ TURN, ATTITUDE, RATE = slice(STATES, STATES + 3), slice(STATES + 3, STATES + 7),
 #: A plane, (A, B, C, D); and the least part of its distance at which the tip can touch a surface before it.
 Plane4 = tuple[float, float, float, float]
 LEAST_RATIO = 0.1
+#: Standard deviation of a rate of climb in the wash of the rotors (assumed: twice the slow error that is flown); and of
+#: the velocity in a direction that a measurement does not show [m/s].
+HEIGHT_RATE_STD, UNSEEN_STD = 0.1, 30.0
 _NO_WRENCH = (0.0,) * 6
 
 
@@ -205,7 +208,7 @@ class Estimator:
         """As before the first tick, with the inertial data assumed until then."""
         for part in (self._step, self._history, self.contact, self.motion, self._fallback):
             part.reset()
-        self._stamp = self._sample_ns = self._counted_ns = self.wrench_ns = self._plane_ns = -1
+        self._stamp = self._sample_ns = self._counted_ns = self.wrench_ns = self._plane_ns = self._climb_ns = -1
         self._doubt, self.tared, self._plane = False, False, (0.0, 0.0, 1.0, -1.0)
         self.attitude, self.rate, self.force = (measured[name] for name in INERTIAL)
         self.axes, self.wrench = WallAxes.of(self.contact.state.normal, self._level), [0.0] * 6
@@ -298,7 +301,23 @@ class Estimator:
         self.axes = WallAxes(contact.state.normal, (rx, ry, rz), (dx, dy, dz), (gx, gy, gz))
         self.attitude = self._row[ATTITUDE].tolist()
         self.motion.remember(stamp, self._row, dt, density)
+        blind = self.motion.velocity_age_s > self._estimation.velocity_life_s
+        if frame.height_rate is not None and blind and contact.state.known:
+            taken = stamp if frame.height_rate_stamp_ns is None else frame.height_rate_stamp_ns
+            self._correct_height_rate(frame.height_rate, taken)
         return contact.state
+
+    def _correct_height_rate(self, height_rate: float, stamp_ns: int) -> None:
+        """Correct the vertical velocity of a vehicle that has no young one from pictures; every sample counts once."""
+        if stamp_ns <= self._climb_ns:
+            return
+        self._climb_ns, wall = stamp_ns, self.contact.state
+        down = np.array(down_in_body(self.attitude_at(stamp_ns)))
+        vertical = np.outer(down, down)
+        covariance = HEIGHT_RATE_STD**2 * vertical + UNSEEN_STD**2 * (np.eye(3) - vertical)
+        place = (*wall.normal, *down.tolist(), wall.distance)
+        self.motion.correct_velocity(-height_rate * down, covariance, stamp_ns, place)
+        self._motion[:] = self._history.newest[:STATES]
 
     def _take_inertial(
         self, stamp: int, dt: float, measured: Mapping[str, list[float]], missing: Collection[str], motors: MotorsModel

@@ -275,6 +275,37 @@ class WallMotion:
             self._velocity_stamp = frame.stamp_ns
         self.state = self._history.newest[:STATES].tolist()
 
+    def correct_velocity(
+        self,
+        velocity: np.ndarray,
+        covariance: np.ndarray,
+        stamp_ns: int,
+        wall: Sequence[float],
+        *,
+        refused_long: bool = False,
+    ) -> Correction | None:
+        """Correct with a velocity of any sensor.
+
+        Args:
+            velocity: In B [m/s], (3,).
+            covariance: Of it, (3, 3); large in directions that were not observed.
+            stamp_ns: Time for which it holds.
+            wall: Normal, gravity and distance as of `correct`, (7,).
+            refused_long: Whether a refused one makes the filter start again.
+
+        Returns:
+            The result; None at a time without ticks.
+        """
+        place = self._history.find(stamp_ns)
+        if place is None:
+            return None
+        values = 1.0, *velocity.tolist(), *covariance.ravel().tolist(), refused_long, *_NO_LINE
+        found = self._evaluate(place, stamp_ns, wall, values)
+        if found.accepted:
+            self._history.change(place, self._changes)
+            self.state = self._history.newest[:STATES].tolist()
+        return found
+
     def _evaluate(self, place: int, stamp_ns: int, wall: Sequence[float], measurement: Sequence[float]) -> Correction:
         """Correct with one measurement of a time at a place of the history."""
         last, step = self._corrected_stamp, self._step
@@ -301,15 +332,11 @@ class WallMotion:
             return
         stamp, since, rows = frame.velocity_stamp_ns or frame.stamp_ns, self._refused_stamp, self._history.rows
         refused_s = (frame.stamp_ns - since) * 1e-9 if since >= 0 else 0.0
-        place, found = self._history.find(stamp), None
-        if place is not None:
-            values = *frame.velocity.tolist(), *frame.velocity_covariance.ravel().tolist()
-            long = refused_s > self._config.refusal_s
-            found = self._evaluate(place, stamp, wall, (1.0, *values, long, *_NO_LINE))
-            if found.accepted:
-                self._history.change(place, self._changes)
-                self._velocity_stamp, self._refused_stamp, self.refused_s = frame.stamp_ns, -1, 0.0
-                return
+        long = refused_s > self._config.refusal_s
+        found = self.correct_velocity(frame.velocity, frame.velocity_covariance, stamp, wall, refused_long=long)
+        if found is not None and found.accepted:
+            self._velocity_stamp, self._refused_stamp, self.refused_s = frame.stamp_ns, -1, 0.0
+            return
         self._refused_stamp, self.refused_s = frame.stamp_ns if since < 0 else since, refused_s
         if found is not None and found.restart:
             rows[:, VELOCITY], rows[:, BIAS] = self._seen, self._history.newest[BIAS].copy()

@@ -12,7 +12,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import VERTICAL, Measurement, Reference
 from ibvs_qp.qp.program_code import real, reals
-from ibvs_qp.validation.fields import REFERENCE, measurement_table
+from ibvs_qp.validation.fields import REFERENCE, field_table
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 
 #: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
@@ -49,7 +49,7 @@ def write_recorded(
 
 
 def _measurement(measurement: Measurement, slots: int, single: bool) -> str:
-    rows = measurement_table(0).rows
+    rows = field_table(Measurement).rows
     members = {row.name: getattr(measurement, row.name) for row in rows} | {"plane": measurement.plane}
     optional = {row.name for row in rows if row.optional} | {"plane"}
     known = {f"has_{name}": True for name in optional if members[name] is not None}

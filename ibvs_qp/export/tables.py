@@ -14,7 +14,7 @@ from ibvs_qp.analytic import RANK_TOLERANCE
 from ibvs_qp.config import Gains
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.frames import GRAVITY
-from ibvs_qp.measurement import Reference
+from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.hover import hover_gains
 from ibvs_qp.model.setpoints import ANY_STEP
 from ibvs_qp.model.tick import LINE
@@ -22,7 +22,7 @@ from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.qp.program_code import real, reals, table
 from ibvs_qp.symbolic.signals import places
 from ibvs_qp.validation import clock, geometry
-from ibvs_qp.validation.fields import REFERENCE, UNIT_TOLERANCE, FieldTable, measurement_table
+from ibvs_qp.validation.fields import REFERENCE, UNIT_TOLERANCE, FieldTable, field_table
 from ibvs_qp.validation.measurement import LINES_PER_SLOT, OLDEST_LINE_NS
 
 GAINS = fields(Gains)
@@ -40,7 +40,7 @@ def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "STATES": function.numel_in(1),
         "RESULTS": function.numel_out(2),
         "GAINS": len(GAINS),
-        "MEASUREMENT_FIELDS": len(measurement_table(vehicle.geometry.count).rows),
+        "MEASUREMENT_FIELDS": len(field_table(Measurement, vehicle.geometry.count).rows),
         "REFERENCE_FIELDS": len(REFERENCE.rows),
         "RECOVERY_TICKS": config.solver.recovery_ticks,
         "RESTART_STAMPS": clock.RESTART_STAMPS,
@@ -106,7 +106,10 @@ def write_tables(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
     """Write ``ibvs_tables.c``: bounds of the inputs, start values and vehicle."""
     config, signals = problem.model.config, tick.signals
     vehicle, first = config.vehicle, Reference()
-    effectiveness, measurements = control_effectiveness(vehicle.geometry), measurement_table(vehicle.geometry.count)
+    effectiveness, measurements = (
+        control_effectiveness(vehicle.geometry),
+        field_table(Measurement, vehicle.geometry.count),
+    )
     before = [f".{row.name} = {{{reals(row.fallback, single)}}}" for row in measurements.rows if row.fallback]
     asked = [f".{name} = {real(getattr(first, name), single)}" for name in ("push_force", "standoff")]
     gains = {
@@ -145,7 +148,7 @@ def _field_table(kind: str, fields: FieldTable, single: bool) -> list[str]:
         entries = (
             f"offsetof(ibvs_{kind}, {field.name})",
             f"offsetof(ibvs_{kind}, has_{field.name})" if field.optional else "IBVS_NO_FLAG",
-            str(max(field.size, 1)),
+            str((*field.shape, 1)[0]),
             real(field.low, single),
             real(field.high, single),
             str(field.unit_length).lower(),

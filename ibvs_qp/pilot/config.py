@@ -15,6 +15,7 @@ from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.gains import LAWS
 from ibvs_qp.config.settings import choice, derive, dump_toml, load_toml, setting, validate
 from ibvs_qp.frames import to_camera
+from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.vision.config import VisionConfig
@@ -24,12 +25,16 @@ from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 #: Distance of a guide from the view barrier at which the barrier hardly acts [m]; range of the result [m].
 _BARRIER_ROOM_M, _LEAST_REACH_M, _MOST_REACH_M = 0.015, 0.02, 2.0
 
+_IMAGE = channels(SensorFrame)["image"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class CameraConfig(RgbdCameraSettings):
     """Settings of the camera beside the colour intrinsics, which come with every picture."""
 
-    latest_s: float = setting(0.30, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0)
+    latest_s: float = setting(
+        _IMAGE.oldest_s, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0
+    )
     readout_s: float = setting(
         0.0,
         "rolling shutter of the colour picture: first to last row, the stamp is that of the row cy; 0 for a global one",

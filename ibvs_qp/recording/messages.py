@@ -12,15 +12,15 @@ import functools
 import json
 import types
 import typing
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
+from ibvs_qp.measurement import channels
+
 PACKAGE = "ibvs_qp"
-#: Fields that are square matrices, and their size; all other arrays have one dimension.
-MATRICES = {"covariance": 2, "velocity_covariance": 3, "segment": 2}
 #: Fields that are not in the log: evaluated on reading, or pictures, which have topics of their own.
 LEFT_OUT = {"tasks", "image"}
 #: Field of the JSON.
@@ -62,14 +62,19 @@ class _Slot(NamedTuple):
 
 @functools.cache
 def _slots(kind: type) -> tuple[_Slot, ...]:
-    return tuple(_slot(name, hint) for name, hint in typing.get_type_hints(kind).items() if name not in LEFT_OUT)
+    known = channels(kind) if is_dataclass(kind) else {}
+    return tuple(
+        _slot(name, hint, known[name].shape if name in known else ())
+        for name, hint in typing.get_type_hints(kind).items()
+        if name not in LEFT_OUT
+    )
 
 
-def _slot(name: str, hint: Any) -> _Slot:
+def _slot(name: str, hint: Any, shape: tuple[int, ...]) -> _Slot:
     options = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
     (hint, *_), optional = [option for option in options if option is not types.NoneType], types.NoneType in options
     if hint is np.ndarray:
-        return _Slot(name, float, float, True, optional, True, (MATRICES[name],) * 2 if name in MATRICES else ())
+        return _Slot(name, float, float, True, optional, True, shape if len(shape) > 1 else ())
     many = typing.get_origin(hint) is tuple
     kind = typing.get_args(hint)[0] if many else hint
     scalar = str if issubclass(kind, enum.Enum) else kind if kind in _SCALARS else None

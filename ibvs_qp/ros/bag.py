@@ -13,7 +13,7 @@ from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.ros.held import HeldSamples
 from ibvs_qp.ros.open_bag import OpenBag
-from ibvs_qp.ros.topics import ACCEPTED, CAMERA, MOTION, Topics
+from ibvs_qp.ros.topics import ACCEPTED, CAMERA, SAMPLES, Topics
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -52,7 +52,7 @@ class Bag:
             ConfigError: When the bag cannot be read, lacks a topic, has one of another type, or has another lens.
         """
         least_ns, last = round(LEAST_RATIO * 1e9 * period_s), None
-        for role in self._pass(MOTION, CAMERA):
+        for role in self._pass(SAMPLES, CAMERA):
             camera = self.held.camera
             if role == "camera_info" and camera is not None and not camera.has_lens(distortion):
                 raise ConfigError(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import RgbdFrame, SensorFrame
+from ibvs_qp.measurement import RgbdFrame, SensorFrame, channels
 from ibvs_qp.ros import pictures, samples
 from ibvs_qp.ros.messages import BadMessage, from_ros
 from ibvs_qp.ros.topics import MOTION, Topics
@@ -73,18 +73,10 @@ class HeldSamples:
         """Frame of a tick, with a picture that no frame had; None until every sensor was received."""
         if any(role not in self.last for role in MOTION):
             return None
-        inertial, attitude, wrench = (self.last[role] for role in MOTION)
-        return SensorFrame(
-            stamp_ns=stamp_ns,
-            attitude=attitude.values["attitude"],
-            angular_velocity=inertial.values["angular_velocity"],
-            specific_force=inertial.values["specific_force"],
-            wrench=wrench.values["wrench"],
-            wrench_stamp_ns=wrench.stamp_ns,
-            image=self.take_picture(),
-            attitude_stamp_ns=attitude.stamp_ns,
-            imu_stamp_ns=inertial.stamp_ns,
-        )
+        values: dict[str, Any] = {}
+        for sample in self.last.values():
+            values |= sample.values | {channels(SensorFrame)[name].stamp: sample.stamp_ns for name in sample.values}
+        return SensorFrame(stamp_ns=stamp_ns, image=self.take_picture(), **values)
 
     def take_picture(self) -> RgbdFrame | None:
         """The last complete picture, once."""
@@ -97,15 +89,10 @@ class HeldSamples:
             raise BadMessage("stamp is not of this computer's clock, or too old")
 
     def _add_sample(self, role: str, value: Any) -> None:
-        if role == "imu":
-            sample = samples.inertial(value)
-            if not self._topics.attitude:
-                self.check_clock(sample.stamp_ns)
-                self.last["attitude"] = samples.attitude(value)
-        elif role == "attitude":
-            sample = samples.attitude(value)
-        else:
-            sample = samples.wrench(value, self._topics.wrench_axes, self._topics.wrench_on)
+        sample = samples.READERS[role](value, self._topics)
+        if role == "imu" and not self._topics.attitude:
+            self.check_clock(sample.stamp_ns)
+            self.last["attitude"] = samples.attitude(value)
         self.check_clock(sample.stamp_ns)
         self.last[role] = sample
 

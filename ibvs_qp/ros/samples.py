@@ -7,6 +7,7 @@ A message with a number that is not finite, or whose sender marks the quantity a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ibvs_qp.ros.messages import (
     header,
     message,
 )
+from ibvs_qp.ros.topics import TWIST, Topics
 
 #: Largest difference of a quaternion's length from 1 [-].
 LENGTH_ERROR = 0.01
@@ -36,7 +38,7 @@ class Sample(NamedTuple):
     """Vectors of `ibvs_qp.SensorFrame` by name, and their time."""
 
     stamp_ns: int
-    values: dict[str, np.ndarray]
+    values: dict[str, Any]
 
 
 def inertial(value: Any) -> Sample:
@@ -75,6 +77,11 @@ def wrench(value: Any, axes: str, on: str) -> Sample:
     return Sample(from_ros(value.header.stamp), {"wrench": _convention(vector, axes, on)})
 
 
+def height_rate(value: Any) -> Sample:
+    """Rate of climb of a ``geometry_msgs/TwistStamped``: z upwards, as in ROS's world."""
+    return Sample(from_ros(value.header.stamp), {"height_rate": _finite([value.twist.linear.z]).item()})
+
+
 def to_imu(stamp_ns: int, quaternion: np.ndarray, rate: np.ndarray, force: np.ndarray) -> Any:
     """``sensor_msgs/Imu`` of attitude (w, x, y, z), angular velocity [rad/s] and specific force [m/s^2]."""
     w, x, y, z = swap_attitude(quaternion)
@@ -92,6 +99,26 @@ def to_wrench(stamp_ns: int, vector: np.ndarray, axes: str, on: str) -> Any:
     vector = _convention(np.asarray(vector, float), axes, on)
     value = message("geometry_msgs/msg/Wrench", force=_vector3(vector[:3]), torque=_vector3(vector[3:]))
     return message(WRENCH, header=header(stamp_ns, "force_torque"), wrench=value)
+
+
+def to_twist(stamp_ns: int, climb: float) -> Any:
+    """``geometry_msgs/TwistStamped`` of a rate of climb [m/s]."""
+    value = message("geometry_msgs/msg/Twist", linear=_vector3(np.array((0.0, 0.0, climb))))
+    return message(TWIST, header=header(stamp_ns, "map"), twist=value)
+
+
+#: Sample of a message of every role.
+READERS: dict[str, Callable[[Any, Topics], Sample]] = {
+    "imu": lambda value, topics: inertial(value),
+    "attitude": lambda value, topics: attitude(value),
+    "wrench": lambda value, topics: wrench(value, topics.wrench_axes, topics.wrench_on),
+    "height_rate": lambda value, topics: height_rate(value),
+}
+#: Message of a channel of a frame by its role and its time, beside those of the IMU.
+WRITERS: dict[str, Callable[[int, Any, Topics], Any]] = {
+    "wrench": lambda stamp_ns, vector, topics: to_wrench(stamp_ns, vector, topics.wrench_axes, topics.wrench_on),
+    "height_rate": lambda stamp_ns, climb, topics: to_twist(stamp_ns, climb),
+}
 
 
 def _convention(vector: np.ndarray, axes: str, on: str) -> np.ndarray:

@@ -9,17 +9,22 @@ from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, setting, validate
 from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH
 
+TWIST = "geometry_msgs/msg/TwistStamped"
 #: Types that every topic may have, the usual one first.
 ACCEPTED = {
     "imu": (IMU, SENSOR_COMBINED),
     "attitude": (VEHICLE_ATTITUDE, IMU),
     "wrench": (WRENCH,),
+    "height_rate": (TWIST,),
     "color": (IMAGE,),
     "depth": (IMAGE,),
     "camera_info": (CAMERA_INFO,),
 }
-#: Topics of pictures, and of everything else that a frame needs.
+#: Topics of pictures; of everything else that a frame needs, and that it may have.
 CAMERA, MOTION = ("color", "depth", "camera_info"), ("imu", "attitude", "wrench")
+SAMPLES = tuple([role for role in ACCEPTED if role not in CAMERA])
+#: Topics without which a frame is complete, or whose quantity comes with another one: their names may be empty.
+OPTIONAL = ("attitude", *[role for role in SAMPLES if role not in MOTION])
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -36,6 +41,7 @@ class Topics:
     imu: str = setting("/imu/data", "gyro and accelerometer: sensor_msgs/Imu, or px4_msgs/SensorCombined")
     attitude: str = setting("", "px4_msgs/VehicleAttitude or sensor_msgs/Imu; empty for the orientation in imu")
     wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
+    height_rate: str = setting("", "rate of climb: geometry_msgs/TwistStamped, linear.z upwards; empty for none")
     color: str = setting("/camera/camera/color/image_raw", "colour: sensor_msgs/Image, 8 bits per channel")
     depth: str = setting(
         "/camera/camera/aligned_depth_to_color/image_raw", "depth, registered or not: 16UC1 (mm) or 32FC1 (m)"
@@ -61,11 +67,11 @@ class Topics:
         """Validate numbers, choices and names."""
         validate(self)
         for role in ACCEPTED:
-            if getattr(self, role) or role != "attitude":
+            if getattr(self, role) or role not in OPTIONAL:
                 check_name(role, getattr(self, role))
 
     def names(self, roles: tuple[str, ...]) -> dict[str, str]:
-        """Topics by role; without attitude where the IMU's messages have it."""
+        """Topics by role; without those whose name is empty."""
         return {role: name for role in roles if (name := getattr(self, role))}
 
 

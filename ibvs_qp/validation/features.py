@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, LineFeature
-from ibvs_qp.validation.fields import Field, plain_instance
+from ibvs_qp.validation.fields import FEATURE_FRAME, plain_instance
 from ibvs_qp.validation.geometry import VARIANCE_BOUND, read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
-_VELOCITY = Field("velocity", 3, -20.0, 20.0, "m/s")
+(_VELOCITY,) = FEATURE_FRAME.rows
 #: Identities of the first line of each role without one; further ones count down by two.
 _HORIZONTAL_ID, _VERTICAL_ID = -2, -3
 #: Least eigenvalue of a covariance over the largest: below zero by rounding alone.

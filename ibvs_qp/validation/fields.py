@@ -1,4 +1,4 @@
-"""Bounds of every vector and number that enters: one table per type of input.
+"""Bounds of every vector and number that enters: one table per type of input, of its channels.
 
 A vector whose length is within the bound of its entries is accepted by that one comparison; only a longer one is
 compared entry by entry. Lines and planes: `ibvs_qp.validation.geometry`.
@@ -7,46 +7,25 @@ compared entry by entry. Lines and planes: `ibvs_qp.validation.geometry`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ibvs_qp.frames import GRAVITY
+from ibvs_qp.measurement import ROTORS, Channel, FeatureFrame, Reference, SensorFrame, channels
 from ibvs_qp.validation.numbers import FLOAT, described, number, vector
 
 Input = TypeVar("Input")
 
 #: Largest difference of an attitude's squared length from 1.
 UNIT_TOLERANCE = 0.02
+#: Shape of no array.
+_NO_ARRAY = (-1,)
 
 
-@dataclass(frozen=True)
-class Field:
-    """One row of a table of bounds.
-
-    Attributes:
-        name: Attribute of the input.
-        size: Entries of its float vector; 0 for a plain number.
-        low: Smallest value of an entry.
-        high: Largest value of an entry.
-        unit: Unit of entries and bounds.
-        fallback: Entries in force until an input was accepted; empty for None.
-        held: Whether the last accepted value stays in force where one is refused; None replaces it otherwise.
-        optional: Whether None is accepted.
-        unit_length: Whether the vector must have length 1.
-    """
-
-    name: str
-    size: int
-    low: float
-    high: float
-    unit: str
-    fallback: tuple[float, ...] = ()
-    held: bool = True
-    optional: bool = False
-    unit_length: bool = False
+class Field(Channel):
+    """One row of a table of bounds: the channel of an attribute of the input, and what its values must be."""
 
     @property
     def accepted_length(self) -> float:
@@ -55,10 +34,10 @@ class Field:
 
     def entries(self, value: Any) -> list[float] | None:
         """Numbers of a value, one for a plain number; None if it is no such value."""
-        if self.size == 0:
+        if not self.shape:
             only = number(value)
             return None if only is None else [only]
-        return vector(value, self.size)
+        return vector(value, self.shape[0])
 
     def accepts(self, entries: list[float]) -> bool:
         """Whether entries, or their length, are as stated; NaN lies within no bounds."""
@@ -71,19 +50,20 @@ class Field:
         """The plain value of the entries."""
         if entries is None:
             return None
-        return np.array(entries) if self.size else entries[0]
+        return np.array(entries) if self.shape else entries[0]
 
     def rejection(self, value: Any) -> str:
         """Name and reason for `Command.rejected`."""
         if value is None:
             return f"{self.name}: missing"
         if self.entries(value) is None:
-            return f"{self.name}: {described(value)}, not {self.size or 'a'} number{'s' * (self.size > 0)}"
+            (size,) = self.shape or (0,)
+            return f"{self.name}: {described(value)}, not {size or 'a'} number{'s' * (size > 0)}"
         if self.unit_length:
             return f"{self.name}: not a unit quaternion"
-        if self.size == 0:
+        if not self.shape:
             return f"{self.name}: not within [{self.low:g}, {self.high:g}] {self.unit}"
-        return f"{self.name}: not {self.size} finite values within {self.high:g} {self.unit}"
+        return f"{self.name}: not {self.shape[0]} finite values within {self.high:g} {self.unit}"
 
 
 #: Entries of the fields of an input by name, list[float]; None where the input had None.
@@ -95,17 +75,21 @@ class FieldTable:
 
     Args:
         rows: The rows.
+        optional_stamps: Stamps of samples that may be None.
 
     Attributes:
         rows: The rows.
         fallbacks: Entries in force until an input was accepted, by name.
+        stamps: The first row of every field with the time of a sample.
+        optional_stamps: Those that may be None: at the tick.
     """
 
-    def __init__(self, *rows: Field) -> None:
-        self.rows = rows
-        self._rows = [(row, row.name, (row.size or -1,), row.accepted_length) for row in rows]
+    def __init__(self, *rows: Field, optional_stamps: tuple[str, ...] = ()) -> None:
+        self.rows, self.optional_stamps = rows, optional_stamps
+        self._rows = [(row, row.name, row.shape or _NO_ARRAY, row.accepted_length) for row in rows]
         self._values = attrgetter(*(row.name for row in rows))
         self.fallbacks: Entries = {row.name: list(row.fallback) or None for row in rows}
+        self.stamps = {row.stamp: row for row in reversed(rows) if row.stamp}
 
     def read(self, source: Any, last: Entries, rejected: list[str]) -> tuple[Entries, dict[str, Any], set[str]]:
         """Check an input, every attribute of which is read once.
@@ -127,7 +111,7 @@ class FieldTable:
                 continue
             if type(value) is np.ndarray and value.dtype == FLOAT and value.shape == shape:
                 own, plain = value.tolist(), True
-            elif type(value) is float and field.size == 0:
+            elif type(value) is float and not field.shape:
                 own, plain = [value], True
             else:
                 own, plain = field.entries(value), False
@@ -164,49 +148,18 @@ def _attribute(source: Any, name: str) -> Any:
         return Unreadable()
 
 
-def _vector(name: str, size: int, bound: float, unit: str, **more: Any) -> Field:
-    return Field(name, size, -bound, bound, unit, **more)
+def field_table(kind: type, rotors: int = 0) -> FieldTable:
+    """Rows of all channels of a type of input that have bounds, for a vehicle with that many rotors."""
+    rows = [Field(**vars(each)) for each in channels(kind).values() if each.high < math.inf]
+    rows = [replace(row, shape=(rotors,)) if row.shape == (ROTORS,) else row for row in rows]
+    stamps = {row.stamp for row in rows}
+    optional = [each.name for each in fields(kind) if each.name in stamps and each.default is None]
+    return FieldTable(*rows, optional_stamps=tuple(optional))
 
 
-_ATTITUDE = _vector("attitude", 4, 1.01, "-", fallback=(1.0, 0.0, 0.0, 0.0), unit_length=True)
-_ANGULAR_VELOCITY = _vector("angular_velocity", 3, 35.0, "rad/s", fallback=(0.0,) * 3)
-
-#: Raw sensors (`SensorFrame`).
-SENSOR_FRAME = FieldTable(
-    _ATTITUDE,
-    _ANGULAR_VELOCITY,
-    _vector("specific_force", 3, 200.0, "m/s^2", fallback=(0.0, 0.0, -GRAVITY)),
-    _vector("wrench", 6, 500.0, "N or N m", fallback=(0.0,) * 6),
-)
-
-#: Targets of a controller (`Reference`): a fault rejects the whole reference.
-REFERENCE = FieldTable(
-    Field("push_force", 0, 0.0, 1e3, "N"),
-    Field("standoff", 0, -1.0, 10.0, "m"),
-    _vector("velocity", 2, 20.0, "m/s"),
-    _vector("travel", 2, 20.0, "m/s"),
-    _vector("tilt", 2, 0.6, "rad"),
-    _vector("trim", 2, 0.6, "rad"),
-)
-
+#: Raw sensors; and the velocity of a picture.
+SENSOR_FRAME, FEATURE_FRAME = field_table(SensorFrame), field_table(FeatureFrame)
+#: Targets of a controller: a fault rejects the whole reference.
+REFERENCE = field_table(Reference)
 #: Targets of a strategy (`ibvs_qp.painting.command.PaintingCommand`).
-PAINTING_COMMAND = FieldTable(Field("push", 0, 0.0, 1e3, "N"), *REFERENCE.rows[1:])
-
-
-def measurement_table(rotors: int) -> FieldTable:
-    """Table for a `Measurement` of a vehicle with that many rotors."""
-    return FieldTable(
-        _ATTITUDE,
-        _ANGULAR_VELOCITY,
-        _vector("specific_force", 3, 200.0, "m/s^2", optional=True, held=False),
-        _vector("contact_wrench", 6, 500.0, "N or N m", fallback=(0.0,) * 6),
-        _vector("velocity", 3, 20.0, "m/s", optional=True, held=False),
-        _vector("acceleration_bias", 3, 5.0, "m/s^2", optional=True, held=False),
-        thrust_limit("thrust_min", rotors),
-        thrust_limit("thrust_max", rotors),
-    )
-
-
-def thrust_limit(name: str, rotors: int) -> Field:
-    """Row of the lower or upper thrust limits of that many rotors."""
-    return _vector(name, rotors, 1e4, "N", optional=True)
+PAINTING_COMMAND = FieldTable(replace(REFERENCE.rows[0], name="push"), *REFERENCE.rows[1:])

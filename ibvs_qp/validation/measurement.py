@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.measurement import LineFeature, Measurement
+from ibvs_qp.measurement import LineFeature, Measurement, channels
 from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock, stamp_of
-from ibvs_qp.validation.fields import Entries, measurement_table, plain_instance
+from ibvs_qp.validation.fields import Entries, field_table, plain_instance
 from ibvs_qp.validation.geometry import LINE_BOUND, read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
 #: Lines looked at for every line that the program has room for: roles and order select among them.
 LINES_PER_SLOT = 4
 #: Lines and velocities older than this are refused [ns]: the latency of a camera, and some dropped pictures.
-OLDEST_LINE_NS = 300_000_000
+OLDEST_LINE_NS = round(1e9 * channels(Measurement)["lines"].oldest_s)
 #: What a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
@@ -49,7 +49,9 @@ class MeasurementGate:
     STATE = ("replaced", "_last", "_measured", "_wrench_stamp", "_stamps")
 
     def __init__(self, rotors: int, line_slots: int) -> None:
-        self._table, self._most_lines = measurement_table(rotors), LINES_PER_SLOT * line_slots
+        self._table = table = field_table(Measurement, rotors)
+        self._inertial_stamps = [name for name in table.optional_stamps if table.stamps[name].held]
+        self._most_lines = LINES_PER_SLOT * line_slots
         self.clock = MonotonicClock()
         self.reset()
 
@@ -117,7 +119,7 @@ class MeasurementGate:
         if not self._measured or not self.clock.follow(measurement.stamp_ns):
             return False
         self._last, self.replaced, self._wrench_stamp = entries, (), measurement.wrench_stamp_ns
-        for name in ("attitude_stamp_ns", "imu_stamp_ns"):
+        for name in self._inertial_stamps:
             if (stamp := getattr(measurement, name)) is not None:
                 self._stamps[name] = stamp
         return True
@@ -126,11 +128,8 @@ class MeasurementGate:
         """Stamp of the tick, and the optional ones of the inertial sensors: None for at the tick."""
         if type(measurement.stamp_ns) is not int or self.clock.shift_ns:
             changes["stamp_ns"] = self.clock.last_ns
-        for name, stamp in (
-            ("attitude_stamp_ns", measurement.attitude_stamp_ns),
-            ("imu_stamp_ns", measurement.imu_stamp_ns),
-        ):
-            if stamp is None:
+        for name in self._inertial_stamps:
+            if (stamp := getattr(measurement, name)) is None:
                 continue
             if (time := self._check_time(name, stamp, changes, rejected)) is not None:
                 self._stamps[name] = time

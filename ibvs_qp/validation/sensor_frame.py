@@ -7,7 +7,7 @@ from typing import Any
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.validation.capture import CaptureGate
 from ibvs_qp.validation.clock import NO_PAST_TIME, MonotonicClock
-from ibvs_qp.validation.fields import SENSOR_FRAME, plain_instance
+from ibvs_qp.validation.fields import SENSOR_FRAME, Field, plain_instance
 
 
 class SensorGate:
@@ -32,7 +32,7 @@ class SensorGate:
         self.clock.reset()
         self._captures.reset()
         self.last = SENSOR_FRAME.fallbacks
-        self._wrench_stamp, self._stamps = 0, dict[str, int]()
+        self._stamps: dict[str, int] = {}
         self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
@@ -49,9 +49,7 @@ class SensorGate:
         rejected: list[str] = []
         self.last, _, refused = SENSOR_FRAME.read(frame, self.last, rejected)
         self.replaced = tuple(refused)
-        wrench_time = self._time("wrench_stamp_ns", frame.wrench_stamp_ns, rejected)
-        if wrench_time is not None and "wrench" not in refused:
-            self._wrench_stamp = wrench_time
+        times = {name: self._time(frame, name, row, rejected) for name, row in SENSOR_FRAME.stamps.items()}
         image = self._captures.image(frame.image, rejected)
         features = frame.features
         if image is not None and features is not None:
@@ -59,26 +57,31 @@ class SensorGate:
             features = None
         checked = SensorFrame(
             stamp_ns=self.clock.last_ns,
-            wrench_stamp_ns=self._wrench_stamp,
-            attitude_stamp_ns=self._optional_time("attitude_stamp_ns", frame.attitude_stamp_ns, rejected),
-            imu_stamp_ns=self._optional_time("imu_stamp_ns", frame.imu_stamp_ns, rejected),
             image=image,
             features=self._captures.features(features, rejected),
+            **times,
             **SENSOR_FRAME.values(self.last),
         )
         return checked, tuple([f"sensor {reason}" for reason in rejected])
 
-    def _time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
-        """Time of a stamp; None for what is refused."""
+    def _time(self, frame: SensorFrame, name: str, row: Field, rejected: list[str]) -> int | None:
+        """Time of a sample, None for at the tick; that of the last accepted one where stamp or sample is refused.
+
+        A sample that is not held needs a time within its greatest age: it is dropped otherwise.
+        """
+        stamp, optional = getattr(frame, name), name in SENSOR_FRAME.optional_stamps
+        if (stamp is None and optional) or not (row.held or self.last[row.name]):
+            return None
         time = self.clock.sample_time(stamp)
         if time is None:
             rejected.append(f"{name}: {NO_PAST_TIME}")
-        return time
-
-    def _optional_time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
-        """Time of a stamp that may be None: at the tick; a refused one is replaced by the last accepted one."""
-        if stamp is None:
-            return None
-        if (time := self._time(name, stamp, rejected)) is not None:
+        elif optional or row.name not in self.replaced:
             self._stamps[name] = time
-        return self._stamps.get(name, 0)
+        if row.held:
+            return self._stamps.get(name, 0)
+        if time is not None and (age_s := (self.clock.last_ns - time) * 1e-9) > row.oldest_s:
+            rejected.append(f"{row.name}: {age_s:.3g} s old, at most {row.oldest_s:g} s")
+            time = None
+        if time is None:
+            self.last[row.name] = None
+        return time

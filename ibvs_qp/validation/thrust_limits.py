@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.validation.fields import thrust_limit
+from ibvs_qp.measurement import Measurement
+from ibvs_qp.validation.fields import field_table
 
 
 class ThrustLimits:
@@ -22,7 +23,7 @@ class ThrustLimits:
     """
 
     def __init__(self, rotors: int) -> None:
-        self._sides = [thrust_limit("thrust_min", rotors), thrust_limit("thrust_max", rotors)]
+        self._sides = [row for row in field_table(Measurement, rotors).rows if row.name in ("thrust_min", "thrust_max")]
         self.reset()
 
     def reset(self) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.config.settings import setting
 from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.validation.fields import SENSOR_FRAME
 from sim.faults.camera import picture_of, restamped, with_picture
 from sim.faults.fault import FrameFilter, SensorFault
 
@@ -29,7 +30,7 @@ class ClockLeap(SensorFault):
         def leapt(frame: SensorFrame) -> SensorFrame:
             since[:] = since or [frame.stamp_ns]
             stamps: dict[str, Any] = {"stamp_ns": frame.stamp_ns + offset}
-            for name in ("wrench_stamp_ns", "attitude_stamp_ns", "imu_stamp_ns"):
+            for name in SENSOR_FRAME.stamps:
                 stamp = getattr(frame, name)
                 if stamp is not None and stamp >= since[0]:
                     stamps[name] = stamp + offset

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from ibvs_qp.config.settings import Checked, setting
-from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.config.settings import Checked, choice, setting
+from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.validation.fields import SENSOR_FRAME
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
 
@@ -80,3 +83,43 @@ class SensorFault(Fault):
         Args:
             rng: Random numbers of this fault.
         """
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelFault(SensorFault):
+    """One channel of the sensor frame fails."""
+
+    channel: str = choice("wrench", "which one", tuple([row.name for row in SENSOR_FRAME.rows]))
+    how: str = choice(
+        "nan",
+        "no numbers, or the sample of then again and again, with fresh stamps or its own",
+        ("nan", "stuck", "lost"),
+    )
+
+    def filter(self, rng: np.random.Generator) -> FrameFilter:
+        """NaN, or repeat the first frame's."""
+        names = (self.channel,)
+        return not_numbers(names) if self.how == "nan" else repeated(names, stamps=self.how == "lost")
+
+
+def repeated(names: Sequence[str], *, stamps: bool) -> FrameFilter:
+    """Repeats channels of the first frame, with their stamps or without."""
+    last: dict[str, Any] = {}
+
+    def stuck(frame: SensorFrame) -> SensorFrame:
+        if not last:
+            last.update({name: copy.copy(getattr(frame, name)) for name in names})
+            for stamp in {channels(SensorFrame)[name].stamp for name in names} if stamps else ():
+                last[stamp] = frame.stamp_ns if (taken := getattr(frame, stamp)) is None else taken
+        return dataclasses.replace(frame, **last)
+
+    return stuck
+
+
+def not_numbers(names: Sequence[str]) -> FrameFilter:
+    """NaN in every entry of channels."""
+    bad: dict[str, Any] = {}
+    for name in names:
+        shape = channels(SensorFrame)[name].shape
+        bad[name] = np.full(shape, math.nan) if shape else math.nan
+    return lambda frame: dataclasses.replace(frame, **bad)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ibvs_qp.config.settings import setting
-from ibvs_qp.measurement import SensorFrame
-from sim.faults.fault import FrameFilter, SensorFault
+from sim.faults.fault import FrameFilter, SensorFault, not_numbers, repeated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,14 +17,7 @@ class ForceTorqueLost(SensorFault):
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Repeat sample and stamp of the first frame."""
-        last: list[tuple[np.ndarray, int]] = []
-
-        def lost(frame: SensorFrame) -> SensorFrame:
-            last[:] = last or [(frame.wrench.copy(), frame.wrench_stamp_ns)]
-            wrench, stamp_ns = last[0]
-            return dataclasses.replace(frame, wrench=wrench, wrench_stamp_ns=stamp_ns)
-
-        return lost
+        return repeated(("wrench",), stamps=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +26,7 @@ class ForceTorqueStuck(SensorFault):
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Repeat the sample of the first frame."""
-        last: list[np.ndarray] = []
-
-        def stuck(frame: SensorFrame) -> SensorFrame:
-            last[:] = last or [frame.wrench.copy()]
-            return dataclasses.replace(frame, wrench=last[0])
-
-        return stuck
+        return repeated(("wrench",), stamps=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +35,7 @@ class ForceTorqueNan(SensorFault):
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """NaN in all six entries."""
-        return lambda frame: dataclasses.replace(frame, wrench=np.full(6, math.nan))
+        return not_numbers(("wrench",))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.config.settings import choice, setting
-from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.estimation.estimator import INERTIAL
+from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.quaternion import multiply
-from sim.faults.fault import FrameFilter, SensorFault
+from sim.faults.fault import FrameFilter, SensorFault, not_numbers, repeated
 
-#: What the unit delivers, with the entries of each.
-OUTPUTS = {"attitude": 4, "angular_velocity": 3, "specific_force": 3}
+#: Stamps of what the unit delivers.
+_STAMPS = tuple([channels(SensorFrame)[name].stamp for name in INERTIAL])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,16 +28,7 @@ class ImuStuck(SensorFault):
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Repeat the values of the first frame."""
-        last: dict[str, Any] = {}
-
-        def stuck(frame: SensorFrame) -> SensorFrame:
-            if not last:
-                last.update({name: getattr(frame, name).copy() for name in OUTPUTS})
-                if not self.fresh:
-                    last.update({name: frame.stamp_ns for name in ("attitude_stamp_ns", "imu_stamp_ns")})
-            return dataclasses.replace(frame, **last)
-
-        return stuck
+        return repeated(INERTIAL, stamps=not self.fresh)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +46,8 @@ class ImuLate(SensorFault):
             while len(taken) > 1 and taken[1].stamp_ns <= frame.stamp_ns - round(1e9 * self.latency_s):
                 taken.popleft()
             old = taken[0]
-            values = {name: getattr(old, name) for name in OUTPUTS}
-            stamps = {"attitude_stamp_ns": old.stamp_ns, "imu_stamp_ns": old.stamp_ns}
-            return dataclasses.replace(frame, **values, **stamps)
+            values: dict[str, Any] = {name: getattr(old, name) for name in INERTIAL}
+            return dataclasses.replace(frame, **values, **dict.fromkeys(_STAMPS, old.stamp_ns))
 
         return late
 
@@ -65,14 +56,11 @@ class ImuLate(SensorFault):
 class ImuNan(SensorFault):
     """Values that are no numbers."""
 
-    output: str = choice("all", "what is no number", ("all", *OUTPUTS))
+    output: str = choice("all", "what is no number", ("all", *INERTIAL))
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """NaN in every entry."""
-        bad: dict[str, Any] = {
-            name: np.full(size, math.nan) for name, size in OUTPUTS.items() if self.output in ("all", name)
-        }
-        return lambda frame: dataclasses.replace(frame, **bad)
+        return not_numbers(INERTIAL if self.output == "all" else (self.output,))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.faults.air import SidePush, WindStep
 from sim.faults.camera import CameraFrozen, CameraJitter, CameraLatency, CameraLost, CameraReordered
 from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
-from sim.faults.fault import Fault, NoFault
+from sim.faults.fault import ChannelFault, Fault, NoFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
 from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuLate, ImuNan, ImuStuck
@@ -17,7 +17,7 @@ from sim.faults.wall import BoardMoved, EdgeBroken, OtherWall
 KINDS: dict[str, type[Fault]] = {
     kind.__name__: kind
     for kind in (
-        NoFault,
+        NoFault, ChannelFault,
         CameraLost, CameraLatency, CameraJitter, CameraReordered, CameraFrozen,
         PlaneLost, LinesLost, WrongLines, DepthFlipped, FeatureNan, PictureCovered,
         ForceTorqueLost, ForceTorqueStuck, ForceTorqueNan, ForceTorqueZero, ForceTorqueBias,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class ForceTorque:
         self.bias = np.append(scene.bias_n * random_direction(self._noise, 3), np.zeros(3))
         self._errors = WrenchErrors(errors, vehicle, seed) if errors != ForceTorqueErrors() else None
         self._line: deque[tuple[int, np.ndarray]] = deque()
-        self.wrench, self.stamp_ns = np.zeros(0), 0
+        self.reading: dict[str, Any] = {}
 
     def sample(self, plant: Plant) -> None:
         """Take a sample if one is due, and deliver those whose delay is over."""
@@ -47,5 +48,6 @@ class ForceTorque:
         if now >= clock.next_ns and clock.due(now):
             wrench = plant.truth[_WRENCH] + self.bias + self._sigma * self._noise.take(6)
             line.append((now, wrench if self._errors is None else self._errors.applied(wrench, plant.truth, now)))
-        while line and (line[0][0] + self._latency_ns <= now or not self.wrench.size):
-            self.stamp_ns, self.wrench = line.popleft()
+        while line and (line[0][0] + self._latency_ns <= now or not self.reading):
+            stamp_ns, wrench = line.popleft()
+            self.reading = {"wrench": wrench, "wrench_stamp_ns": stamp_ns}

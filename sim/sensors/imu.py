@@ -44,7 +44,7 @@ class Imu:
         self._kick, self._sample = np.zeros(9), np.zeros(10)
         self._errors = ImuErrors(errors, scene.rate_hz, seed) if ImuErrors.present(errors) else None
         self._plant: Plant | None = None
-        self.attitude = self.angular_velocity = self.specific_force = np.zeros(0)
+        self.reading: dict[str, np.ndarray] = {}
 
     def _bind(self, plant: Plant) -> None:
         self._plant = plant
@@ -62,7 +62,7 @@ class Imu:
         self._kick[:] = self._noise.take()
         self._read()
         sample = self._sample.copy() if errors is None else errors.applied(self._sample)
-        self.attitude, self.angular_velocity, self.specific_force = sample[:4], sample[4:7], sample[7:]
+        self.reading = {"attitude": sample[:4], "angular_velocity": sample[4:7], "specific_force": sample[7:]}
 
 
 @functools.cache

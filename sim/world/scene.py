@@ -6,11 +6,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
+from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
 
 Color = tuple[int, int, int]
+#: Nominal rates and delays of the sensors.
+_SENSORS = channels(SensorFrame)
+_IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
+_CLIMB = _SENSORS["height_rate"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +85,8 @@ class CameraScene(Checked):
     width: int = setting(640, "picture width", unit="px", low=160, high=1920)
     height: int = setting(480, "picture height", unit="px", low=120, high=1080)
     vertical_fov_deg: float = setting(42.0, "vertical field of view", unit="deg", low=20.0, high=100.0)
-    rate_hz: float = setting(30.0, "frame rate", unit="Hz", low=5.0, high=120.0)
-    latency_s: float = setting(0.060, "capture to delivery", unit="s", low=0.0, high=0.3)
+    rate_hz: float = setting(_IMAGE.rate_hz, "frame rate", unit="Hz", low=5.0, high=120.0)
+    latency_s: float = setting(_IMAGE.latency_s, "capture to delivery", unit="s", low=0.0, high=0.3)
     depth_noise_relative: float = setting(0.005, "white and correlated depth noise per depth", low=0.0, high=0.05)
 
 
@@ -89,22 +94,36 @@ class CameraScene(Checked):
 class ForceTorqueScene(Checked):
     """The force/torque sensor at the arm's base."""
 
-    rate_hz: float = setting(100.0, "sample rate", unit="Hz", low=20.0, high=1000.0)
+    rate_hz: float = setting(_WRENCH.rate_hz, "sample rate", unit="Hz", low=20.0, high=1000.0)
     sigma_n: float = setting(0.1, "force noise per sample and axis", unit="N", low=0.0, high=10.0)
     sigma_nm: float = setting(0.005, "moment noise per sample and axis", unit="N m", low=0.0, high=1.0)
     bias_n: float = setting(0.05, "size of the force bias of a flight", unit="N", low=0.0, high=20.0)
-    latency_s: float = setting(0.004, "sampling to delivery", unit="s", low=0.0, high=0.1)
+    latency_s: float = setting(_WRENCH.latency_s, "sampling to delivery", unit="s", low=0.0, high=0.1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImuScene(Checked):
     """Gyro, accelerometer and attitude estimate."""
 
-    rate_hz: float = setting(250.0, "sample rate", unit="Hz", low=50.0, high=1000.0)
+    rate_hz: float = setting(_INERTIAL.rate_hz, "sample rate", unit="Hz", low=50.0, high=1000.0)
     gyro_density: float = setting(3.4e-4, "gyro noise density", unit="rad/s/sqrt(Hz)", low=0.0, high=0.1)
     accel_density: float = setting(4e-3, "accelerometer noise density", unit="m/s^2/sqrt(Hz)", low=0.0, high=1.0)
     attitude_bias_deg: float = setting(0.1, "size of the attitude bias of a flight", unit="deg", low=0.0, high=5.0)
     attitude_noise_deg: float = setting(0.05, "attitude noise per sample", unit="deg", low=0.0, high=5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BarometerScene(Checked):
+    """A barometer with a vertical-speed filter; none by default."""
+
+    fitted: bool = setting(False, "the vehicle has one")
+    rate_hz: float = setting(_CLIMB.rate_hz, "sample rate", unit="Hz", low=1.0, high=250.0)
+    sigma_m_s: float = setting(0.05, "noise of the rate of climb per sample", unit="m/s", low=0.0, high=5.0)
+    wander_m_s: float = setting(
+        0.05, "slow error by the rotors' wash, standard deviation", unit="m/s", low=0.0, high=5.0
+    )
+    wander_time_s: float = setting(1.0, "correlation time of the slow error", unit="s", low=0.1, high=100.0)
+    latency_s: float = setting(_CLIMB.latency_s, "sampling to delivery", unit="s", low=0.0, high=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +153,7 @@ class Scene(Checked):
     camera: CameraScene = field(default_factory=CameraScene)
     force_torque: ForceTorqueScene = field(default_factory=ForceTorqueScene)
     imu: ImuScene = field(default_factory=ImuScene)
+    barometer: BarometerScene = field(default_factory=BarometerScene)
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
     errors: WorldErrors = field(default_factory=WorldErrors)

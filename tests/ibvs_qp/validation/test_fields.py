@@ -14,9 +14,9 @@ from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.validation.fields import REFERENCE, Field, FieldTable, plain_instance
 
 ROWS = (
-    Field("direction", 4, -1.01, 1.01, "-", unit_length=True, fallback=(1.0, 0.0, 0.0, 0.0)),
-    Field("number", 0, -1.0, 2.0, "m"),
-    Field("speed", 2, -3.0, 3.0, "m/s", optional=True, held=False),
+    Field("direction", (4,), -1.01, 1.01, "-", unit_length=True, fallback=(1.0, 0.0, 0.0, 0.0)),
+    Field("number", (), -1.0, 2.0, "m"),
+    Field("speed", (2,), -3.0, 3.0, "m/s", optional=True, held=False),
 )
 TABLE = FieldTable(*ROWS)
 values = st.sampled_from([0.0, 1.0, -1.0, 2.0, 3.0, -3.0, 3.1, math.nan, math.inf])
@@ -119,8 +119,8 @@ def test_reasons_are_true() -> None:
         "push_force: not within [0, 1000] N",
         "standoff: str, not a number",
         "velocity: not 2 finite values within 20 m/s",
-        "travel: array of float64 with shape (3,), not 2 numbers",
         "tilt: not 2 finite values within 0.6 rad",
+        "travel: array of float64 with shape (3,), not 2 numbers",
     ]
 
 

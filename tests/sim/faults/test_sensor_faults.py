@@ -11,8 +11,10 @@ import pytest
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import roll_pitch
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineFeature, RgbdFrame, SensorFrame
+from ibvs_qp.validation.fields import SENSOR_FRAME
 from sim.faults.camera import CameraFrozen, CameraJitter, CameraLatency, CameraLost, CameraReordered
 from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
+from sim.faults.fault import ChannelFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
 from sim.faults.imu import AccelerometerBias, AttitudeStep, GyroBias, ImuNan, ImuStuck
@@ -161,6 +163,18 @@ def test_the_inertial_unit_is_stuck_or_not_a_number():
     frame, got = through(ImuNan(output="specific_force"))[-1]
     assert np.isnan(got.specific_force).all() and got.attitude is frame.attitude
     assert np.isnan(through(ImuNan())[-1][1].attitude).all()
+
+
+@pytest.mark.parametrize("row", SENSOR_FRAME.rows, ids=lambda row: row.name)
+def test_every_channel_fails_in_three_ways(row):
+    _, got = through(ChannelFault(channel=row.name, how="nan"))[-1]
+    assert np.isnan(getattr(got, row.name)).all() and np.shape(getattr(got, row.name)) == row.shape
+    for how in ("stuck", "lost"):
+        first, *_, last = through(ChannelFault(channel=row.name, how=how))
+        assert np.array_equal(getattr(last[1], row.name), getattr(first[0], row.name))
+        since = getattr(first[0], row.stamp)
+        expected = getattr(last[0], row.stamp) if how == "stuck" else first[0].stamp_ns if since is None else since
+        assert getattr(last[1], row.stamp) == expected
 
 
 def test_biases_and_steps_of_the_inertial_unit():
