@@ -5,12 +5,13 @@ import math
 
 import numpy as np
 import pytest
+from controller_scenes import TICK_NS
 
 from ibvs_qp.frames import GRAVITY, roll_pitch, rotation_from_quaternion
 from ibvs_qp.measurement import SensorFrame
 from sim.sensors.sample_clock import SampleClock
 from sim.sensors.suite import SensorSuite
-from sim.world.plant import TICK_NS, Plant
+from sim.world.plant import Plant
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene
 
 CLEAN_IMU = ImuScene(gyro_density=0.0, accel_density=0.0, attitude_bias_deg=0.0, attitude_noise_deg=0.0)

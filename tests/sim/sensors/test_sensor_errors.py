@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from controller_scenes import TICK_NS
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY, roll_pitch
@@ -18,7 +19,7 @@ from sim.sensors.suite import SensorSuite
 from sim.sensors.vibration import BLADE_HZ, BLADE_SPREAD, Vibration
 from sim.sensors.wrench_errors import WrenchErrors
 from sim.world.errors import AccelerometerErrors, AttitudeErrors, ForceTorqueErrors, GyroErrors, WorldErrors
-from sim.world.plant import TICK_NS, Plant
+from sim.world.plant import Plant
 from sim.world.random_streams import Normals, stream
 from sim.world.readout import PLACES, SIZE
 from sim.world.scene import Scene

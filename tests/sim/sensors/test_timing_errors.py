@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from controller_scenes import TICK_NS
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
@@ -17,7 +18,7 @@ from sim.sensors.cameras.timing import DeliveryErrors, delivery_errors
 from sim.sensors.features import GeometricFeatures
 from sim.world.errors import TimingErrors, WorldErrors
 from sim.world.painted_edges import PaintedEdges
-from sim.world.plant import TICK_NS, Plant
+from sim.world.plant import Plant
 from sim.world.scene import Scene
 
 STAMPS = TimingErrors(stamp_error_s=-0.005, stamp_jitter_s=0.004)

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from controller_scenes import TICK_NS
 from plants import at_rest
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from sim.world.board import BoardGeometry
 from sim.world.clearance import RIM_POINTS, PropellerClearance
-from sim.world.plant import TICK_NS, Plant
+from sim.world.plant import Plant
 from sim.world.scene import BoardScene, Scene
 
 VEHICLE = VehicleParams()

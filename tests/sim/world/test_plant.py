@@ -5,6 +5,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from controller_scenes import TICK_NS
 from plants import at_rest
 
 from allocation import control_effectiveness
@@ -13,7 +14,7 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, skew
 from sim.world.board import BoardGeometry
 from sim.world.mujoco_frames import FLIP
-from sim.world.plant import TICK_NS, Plant
+from sim.world.plant import Plant
 from sim.world.plant_scene import PlantScene
 from sim.world.scene import Scene, StartScene, WindScene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_RIGHT_M, START_YAW_DEG
