@@ -1,7 +1,7 @@
 """HybridController: one quadratic program per tick for lines, push, level flight, yaw and six tilted rotors.
 
 A tick validates its inputs, evaluates the set-points of the tasks (one compiled function that also fills the program),
-solves the program with OSQP and reports what tasks and limits did. The equations are in `ibvs_qp.tasks` and
+solves the program with OSQP and reports the results of tasks and limits. The equations are in `ibvs_qp.tasks` and
 `ibvs_qp.limits`, one file each; the program is assembled in `ibvs_qp.qp.problem`.
 """
 
@@ -104,8 +104,8 @@ class HybridController(CheckedLaw):
         engine_kind: Their solution; a subclass may solve the same rows differently.
 
     Args:
-        config: Everything it needs; the default flies the Tarot T960.
-        tasks: Further tasks beside the shipped ones (docs/extending.md).
+        config: All settings; the default is for the Tarot T960.
+        tasks: Tasks in addition to the shipped ones (docs/extending.md).
         limits: Further limits.
 
     Raises:
@@ -126,7 +126,7 @@ class HybridController(CheckedLaw):
         self.reset()
 
     def reset(self) -> None:
-        """As after construction, to the bit."""
+        """Restore the state after construction, bit-identical."""
         super().reset()
         self.engine.reset()
         self._recovery = 0

@@ -44,7 +44,7 @@ def setting(
         low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
         why: Reason for the default.
-        words: Strings that are allowed beside numbers.
+        words: Strings that are allowed as well as numbers.
     """
     limits = {"low": low, "high": high, "words": words}
     return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, **limits})

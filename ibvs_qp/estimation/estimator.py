@@ -171,7 +171,7 @@ class Estimator:
     Attributes:
         contact: Wall and contact.
         motion: Velocity, odometer and lines in the wall plane.
-        attitude: (w, x, y, z), without steps that the gyro did not see.
+        attitude: (w, x, y, z), without steps that the gyro did not measure.
         rate: Angular velocity [rad/s], (3,).
         force: Specific force [m/s^2], (3,).
         axes: Axes of the wall and gravity in B.
@@ -213,7 +213,7 @@ class Estimator:
 
     @property
     def lost(self) -> bool:
-        """Whether the attitude is too uncertain to fly by."""
+        """Whether the attitude is too uncertain for control."""
         return self._fallback.lost
 
     def doubt(self) -> None:

@@ -33,9 +33,9 @@ from ibvs_qp.symbolic.signals import Signals
 
 T = TypeVar("T")
 
-#: Force or moment given up in the last step above which integrals stop [N, N m].
+#: Unallocated force or moment of the last step above which integrals stop [N, N m].
 WINDUP_WRENCH = 0.5
-#: A row filter of less than this is none [s]: it keeps the exponent finite.
+#: A row filter below this is off [s]: the exponent stays finite.
 LEAST_FILTER = 1e-5
 
 
@@ -119,7 +119,7 @@ class Model:
         self._name_outputs()
 
     def of(self, config: ControllerConfig) -> Model:
-        """A copy for a configuration with the same equations; what is declared in the copy stays in it."""
+        """A copy for a configuration with the same equations; declarations in the copy stay in it."""
         other = copy.copy(self)
         other.config, other.signals, other.parameters = config, self.signals.copy(), list(self.parameters)
         other._cache = dict(self._cache)

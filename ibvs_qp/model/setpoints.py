@@ -134,7 +134,7 @@ class Setpoints:
 
     @contextlib.contextmanager
     def without_trace(self) -> Iterator[None]:
-        """What is evaluated inside leaves no trace: states, outputs, pairs of lines and time are as before."""
+        """Evaluate without a trace: states, outputs, pairs of lines and time are as before."""
         memory, own = self.step.memory.copy(), vars(self._inputs)
         inputs, others = {name: own[name] for name in KEPT}, (self._stamp, self._contact)
         own.update(copy.deepcopy(inputs))
@@ -192,7 +192,7 @@ class Setpoints:
         values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
 
     def note(self, thrusts: np.ndarray, given_up: float) -> np.ndarray:
-        """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step.
+        """Store the commanded thrusts, and the largest unallocated force or moment (anti-windup), for the next step.
 
         Returns:
             The stored copy, read-only: the caller of the controller may write into the command's own array.
@@ -206,7 +206,7 @@ class Setpoints:
 
     @property
     def contact(self) -> ContactState:
-        """Wall and contact at this step: the caller's, or the estimate, which is read when it is wanted."""
+        """Wall and contact at this step: the caller's, or the estimate, which is read on first use."""
         if self._contact is None:
             self._contact = read_contact(self.step.results[: self._estimate].tolist())
         return self._contact

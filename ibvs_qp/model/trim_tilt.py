@@ -32,7 +32,7 @@ class TrimTilt:
     In level axes the rotors must make the force :math:`F = f d - m g e_z` and the moment :math:`f p \times d` of the
     push f along :math:`d = n + \mu t`. In a body tilted by :math:`\theta = (\varphi, \vartheta)` they change by
     :math:`F \times \theta` and :math:`f p \times (d \times \theta)`, so the planes :math:`(y_F, y_M)` of the attainable
-    wrench set (`ibvs_qp.model.reach`) see the change :math:`C \theta`:
+    wrench set (`ibvs_qp.model.reach`) change by :math:`C \theta`:
 
     .. math::
         \min_{\theta, s}\; \tfrac12 P\,\theta^T\theta + \tfrac12 s^T s \quad\text{s.t.}\quad
@@ -42,7 +42,7 @@ class TrimTilt:
     method), solves this program of two variables; the angles follow with `TRIM_TIME_S`.
 
     Attributes:
-        angles: Roll and pitch to fly in this tick [rad], (2,); zero without permission.
+        angles: Commanded roll and pitch of this tick [rad], (2,); zero without permission.
     """
 
     def __init__(self, signals: Signals, config: ControllerConfig) -> None:

@@ -14,7 +14,7 @@ from ibvs_qp.painting.speed import ramped
 class Presser(Painter):
     """Approaches and aligns like the painter, presses for a time, slides along the edge for a time, and retreats.
 
-    The hold begins with the touch, whatever push is reached.
+    The hold begins with the touch, at any push.
 
     Args:
         config: The paint job; its push, margins, speed and acceleration are used.

@@ -19,7 +19,7 @@ from ibvs_qp.validation.numbers import matrix
 LINES_PER_SLOT = 4
 #: Lines and velocities older than this are refused [ns]: the latency of a camera, and some dropped pictures.
 OLDEST_LINE_NS = 300_000_000
-#: What a refused measurement lacks.
+#: Fields that a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
 
@@ -27,7 +27,7 @@ def answered_stamp(measurement: Any) -> int:
     """Stamp of an input of any type, 0 if it has none."""
     try:
         stamp = stamp_of(measurement.stamp_ns)
-    except Exception:  # whatever an attribute of something else does
+    except Exception:  # an attribute of any other type may raise
         stamp = None
     return 0 if stamp is None else stamp
 
@@ -71,7 +71,7 @@ class MeasurementGate:
         )
 
     def check(self, measurement: Any) -> tuple[Measurement | None, tuple[str, ...]]:
-        """The measurement with rejected fields replaced, and what was rejected.
+        """The measurement with rejected fields replaced, and the rejections.
 
         Returns:
             None for the measurement when its stamp is refused or no attitude was ever accepted.
@@ -188,7 +188,7 @@ class MeasurementGate:
             changes["lines"] = lines
 
     def _check_velocity_time(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
-        """A velocity of an unknown time is none."""
+        """Reject a velocity without a valid stamp."""
         stamp = measurement.velocity_stamp_ns
         if stamp is None or measurement.velocity is None:
             return

@@ -24,7 +24,7 @@ class RestCheck:
     """Finds an accelerometer or an attitude in other axes than FRD and NED.
 
     Attributes:
-        passed: Whether a rest was seen at which both were right.
+        passed: Whether both were right during a rest.
         faults: In words.
     """
 

@@ -36,7 +36,7 @@ class SensorGate:
         self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
-        """A copy of the frame in the pilot's time with rejected sensors replaced, and what was rejected.
+        """A copy of the frame in the pilot's time with rejected sensors replaced, and the rejections.
 
         Returns:
             None for the frame when its stamp is refused.
@@ -55,7 +55,7 @@ class SensorGate:
         image = self._captures.image(frame.image, rejected)
         features = frame.features
         if image is not None and features is not None:
-            rejected.append("features: not used beside an image")
+            rejected.append("features: not used together with an image")
             features = None
         checked = SensorFrame(
             stamp_ns=self.clock.last_ns,
@@ -69,7 +69,7 @@ class SensorGate:
         return checked, tuple([f"sensor {reason}" for reason in rejected])
 
     def _time(self, name: str, stamp: Any, rejected: list[str]) -> int | None:
-        """Time of a stamp; None for what is refused."""
+        """Time of a stamp; None for a refused one."""
         time = self.clock.sample_time(stamp)
         if time is None:
             rejected.append(f"{name}: {NO_PAST_TIME}")

@@ -1,4 +1,4 @@
-"""What guards a picture: refusal with its reason, tolerant reading of vectors, times of the stages."""
+"""Checks of a picture: refusal with its reason, tolerant reading of vectors, times of the stages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_PIXELS = 1920 * 1200
 STEADY_PICTURES = 5
 #: Smallest focal length, and largest entry of the intrinsics [px].
 _SHORTEST_FOCAL, _INTRINSICS_BOUND = 1.0, 1e5
-#: No RGB-D camera sees a surface as far as this [m]: a larger median is in millimetres.
+#: No RGB-D camera measures a surface as far as this [m]: a larger median is in millimetres.
 _FARTHEST = 100.0
 #: Distance of the pixels of that median [px].
 _SPARSE = 16

@@ -202,7 +202,7 @@ class Perception:
         tilt: float | None,
         wanted: bool,
     ) -> list[Candidate]:
-        """Search for lines when it is time to, or when wanted."""
+        """Search for lines when a search is due or requested."""
         self._since_detection += 1
         self._frames += 1
         settings = self._config.detect

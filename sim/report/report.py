@@ -14,7 +14,7 @@ from typing import Any
 from sim.evaluate.flight_table import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace, law_name
-from sim.report.plain_words import OUTCOMES, limit_words
+from sim.report.wording import OUTCOMES, limit_words
 from sim.storage.atomic import write_text
 from sim.video.film import still
 

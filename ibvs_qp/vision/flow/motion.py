@@ -80,7 +80,7 @@ def surface_motion(
     plane: PlaneEstimate,
     intrinsics: Intrinsics,
 ) -> CameraMotion | None:
-    """Motion of the camera by the points of a plane it sees, or None where too few of them can be followed.
+    """Motion of the camera by the points of a plane in view, or None where too few of them can be followed.
 
     Args:
         before: Brightness of the picture before, uint8 (h, w).

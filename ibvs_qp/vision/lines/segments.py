@@ -111,7 +111,7 @@ def fit_segments(
         config: Settings of the fit.
         colors: Of the surface.
         beyond: Fraction of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
-        contents: Whether the colours of both sides are wanted.
+        contents: Whether the colours of both sides are returned.
         half_width_px: Half width of the strips; 4 px at 640 unless given.
 
     Returns:
@@ -157,10 +157,10 @@ def find_segments(
         small: The picture, uint8 (h, w, 3).
         mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
         factor: Pixels at full resolution per pixel of the picture.
-        region: Cells in which segments are wanted, bool.
+        region: Cells in which segments are searched, bool.
         rows: Row of cells of every row of the picture, (h,).
         columns: The same of its columns, (w,).
-        normals: Directions of the normals that are wanted, by whole degrees, bool (360,).
+        normals: Directions of the normals to search, by whole degrees, bool (360,).
         shortest: Least length [px].
 
     Returns:

@@ -64,7 +64,7 @@ class RgbdCameraSettings:
             allowed = f"focal lengths must be above {_SHORTEST_PX:g} px"
             raise out_of_range("depth_intrinsics", self.depth_intrinsics, "px", allowed)
         if not self.registered and not self.depth_translation_m:
-            raise ConfigError("depth_translation_m is missing: depth_intrinsics are of a depth camera beside")
+            raise ConfigError("depth_translation_m is missing: depth_intrinsics are of a separate depth camera")
         for name in ("depth_distortion", "depth_rotation", "depth_translation_m"):
             if self.registered and getattr(self, name):
                 raise ConfigError(f"depth_intrinsics are missing: {name} is for depth that is not registered to colour")

@@ -25,7 +25,7 @@ def ideal_pixel(
     return (u, v) if np.isfinite((u, v)).all() else None
 
 
-def as_taken(detection: Any, lens: Lens, frame: RgbdFrame) -> Any:
+def raw_pixels(detection: Any, lens: Lens, frame: RgbdFrame) -> Any:
     """The detection with the end points of its lines in the picture as taken; (rho, theta) stay as they are."""
     if lens.none:
         return detection
