@@ -179,13 +179,13 @@ class HybridController(CheckedLaw):
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, limits, given_up = np.zeros(6), (), 0.0
+        unallocated, limits, largest = np.zeros(6), (), 0.0
         if solution.limited:
             limits = active_limits(self.problem, solution.x, solution.y)
         if solution.limited or data.beyond_limits:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
-            given_up = max(map(abs, unallocated.tolist()))
-        own = setpoints.note(thrusts, given_up)
+            largest = max(map(abs, unallocated.tolist()))
+        own = setpoints.note(thrusts, largest)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,

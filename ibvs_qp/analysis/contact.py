@@ -186,7 +186,7 @@ def contact_mode_damping(
     force_delay_s: float,
     vibration_m_s2: float = 0.0,
     gusts: bool = True,
-    stiffness_ratio: float = 1.0,
+    believed: float = 1.0,
 ) -> LoopMargin:
     """Least damping ratio of the contact under a controller; the module derives the loop.
 
@@ -197,9 +197,9 @@ def contact_mode_damping(
         force_delay_s: Mean age of the force sample in use: latency plus half a sample period [s].
         vibration_m_s2: Of the accelerometer, beyond its noise, standard deviation of a sample [m/s^2].
         gusts: Whether the filter of the push follows gusts; it is slower in calm air.
-        stiffness_ratio: Estimated over true stiffness [-].
+        believed: Estimated over true stiffness [-].
     """
-    loop = ContactLoop(config, stiffness, damping, force_delay_s, vibration_m_s2, gusts, stiffness_ratio)
+    loop = ContactLoop(config, stiffness, damping, force_delay_s, vibration_m_s2, gusts, believed)
     ratio, frequency = 1.0, 0.0
     for pole in loop.poles():
         oscillates = abs(pole.imag) > REAL_POLE * abs(pole)

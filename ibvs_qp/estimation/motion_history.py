@@ -160,7 +160,7 @@ def carried_wall(plane: ca.SX, motion: Motion, camera: ca.DM) -> Wall:
 
 
 def carried_line(rho: ca.SX, theta: ca.SX, wall: Wall, motion: Motion, camera: ca.DM) -> tuple[ca.SX, ca.SX]:
-    """Line (rho, theta) at the present; as it was when seen from within the wall, or edge-on."""
+    """Line (rho, theta) at the present; unchanged for a camera inside the wall, or edge-on."""
     turn, shift = in_camera(motion, camera)
     ray = turn @ ca.vertcat(ca.cos(theta), ca.sin(theta), -rho)
     ray = ray + ca.dot(ray, shift) / ca.fmax(wall.distance, LEAST_DISTANCE) * wall.normal

@@ -99,7 +99,7 @@ class Model:
         self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
         self.tip_stationary = ca.logic_and(self.contact.touching, ca.norm_2(velocity) <= SLIDING_COMMAND)
         self.view = camera_view(vehicle, self.body, self.contact, self.travel)
-        self.integrate = signals.input("given_up") < WINDUP_WRENCH
+        self.integrate = signals.input("unallocated") < WINDUP_WRENCH
         self.integrate_in_plane = ca.logic_and(ca.logic_not(self._stuck()), self.integrate)
 
         static_wrench, friction = self._disturbances()

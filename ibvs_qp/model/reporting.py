@@ -78,7 +78,7 @@ def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
     low = least - commanded >= REDUCED
     other = least if low else setpoints.push_reference
     places = 3 if round(commanded, 1) == round(other, 1) else 1
-    result = "asked, below what the rotors can hold: least" if low else "reduced to"
+    result = "asked, below the least push of the rotors," if low else "reduced to"
     end = "," if low else ", the rotors' reach"
     return (f"reference.push_force: {commanded:.{places}f} N {result} {other:.{places}f} N{end} {how}",)
 

@@ -76,7 +76,7 @@ class Setpoints:
         last: Last commanded thrusts [N], (n,), None before the first.
     """
 
-    STATE = ("config", "_contact", "_stamp", "last", "_change", "_given_up")
+    STATE = ("config", "_contact", "_stamp", "last", "_change", "_unallocated")
 
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         config = self.config = model.config
@@ -153,7 +153,7 @@ class Setpoints:
         self._inputs.reset()
         self._stamp = -1
         self.last: np.ndarray | None = None
-        self._change, self._given_up = np.zeros(len(self.floor)), 0.0
+        self._change, self._unallocated = np.zeros(len(self.floor)), 0.0
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
         self.step.outputs["reach"][0], self.step.outputs["least_push"][0] = UNBOUNDED, 0.0
 
@@ -185,13 +185,13 @@ class Setpoints:
         started = self.last is not None
         values["thrust_last"][:] = self.last if started else hold_thrusts(self.config, measurement)
         values["thrust_change"][:], values["commanded"][0] = self._change, started
-        values["given_up"][0] = self._given_up
+        values["unallocated"][0] = self._unallocated
         values["thrust_step"][0] = self._rate_step if started else ANY_STEP
         lowest = self.floor if low is None else np.maximum(low, self.floor)
         values["thrust_low"][:] = lowest
         values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
 
-    def note(self, thrusts: np.ndarray, given_up: float) -> np.ndarray:
+    def note(self, thrusts: np.ndarray, unallocated: float) -> np.ndarray:
         """Store the commanded thrusts, and the largest unallocated force or moment (anti-windup), for the next step.
 
         Returns:
@@ -201,7 +201,7 @@ class Setpoints:
         own.setflags(write=False)  # it is in the reports of the command, too
         if self.last is not None:
             self._change = own - self.last
-        self.last, self._given_up = own, given_up
+        self.last, self._unallocated = own, unallocated
         return own
 
     @property

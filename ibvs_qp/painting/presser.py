@@ -40,7 +40,7 @@ class Presser(Painter):
 
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good; a press that studies this case ends as planned, so it is no failure."""
-        self._give_up(inputs, reason)
+        self._leave_for_good(inputs, reason)
 
     def _time_out(self, inputs: PainterInput) -> None:
         if self.phase != "press" or math.isinf(self._touched):

@@ -28,7 +28,7 @@ LARGEST_OFFSET, LARGEST_ROW = 20.0, 1000
 class Strategy(ABC):
     """Plan for the tip: a subclass implements `step`; defaults exist for everything else.
 
-    The pilot calls `fly`: it returns what `step` returns. A `step` that raises, or returns something unusable, is named
+    The pilot calls `fly`: it returns the result of `step`. A `step` that raises or returns an invalid command is named
     in `Command.rejected`, and the vehicle leaves the wall; so it does when the supervisor ends the job. A subclass with
     state of its own initialises it in `reset`, which first calls ``super().reset()``.
 
@@ -59,7 +59,7 @@ class Strategy(ABC):
         """As after construction."""
         self.phase, self.entered, self.row = PHASES[0], 0.0, 0
         self.log: list[tuple[float, str, str]] = []
-        self.finished = self.failed = self._leaving = self._given_up = False
+        self.finished = self.failed = self._leaving = self._abandoned = False
         self.reason = self.fault = ""
 
     @abstractmethod
@@ -103,7 +103,7 @@ class Strategy(ABC):
         """Targets of one tick: those of `step`, or those of the way off the wall; never raises."""
         if self.finished:
             return self._away()
-        if self._given_up:
+        if self._abandoned:
             return self._descend(inputs)
         if self._leaving:
             return self._retire(inputs)
@@ -121,7 +121,7 @@ class Strategy(ABC):
     @property
     def descending(self) -> bool:
         """Whether it has left the wall for good."""
-        return self._given_up
+        return self._abandoned
 
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good: detach, retreat and descend."""
@@ -130,14 +130,14 @@ class Strategy(ABC):
     def stop(self, inputs: PainterInput, reason: str) -> None:
         """The same at the supervisor's command: the aim is not reached."""
         self.failed = True
-        self._give_up(inputs, reason)
+        self._leave_for_good(inputs, reason)
 
     def expected_edge(self) -> ExpectedEdge | None:
         """A painted edge that should come into view, for perception; None for no such edge."""
         return None
 
-    def _give_up(self, inputs: PainterInput, reason: str) -> None:
-        self.reason, self._given_up = reason, True
+    def _leave_for_good(self, inputs: PainterInput, reason: str) -> None:
+        self.reason, self._abandoned = reason, True
         self.enter(inputs, "retreat", reason)
 
     def _end(self, inputs: PainterInput, reason: str, failed: bool = False) -> None:

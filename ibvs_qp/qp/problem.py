@@ -242,9 +242,9 @@ def _refuse_curved(model: Model, row: str, expression: ca.SX, **others: ca.SX) -
     unknown = ca.veccat(model.thrust, model.acceleration)
     if ca.depends_on(ca.jacobian(expression, unknown), unknown):
         raise ConfigError(f"{row}: its expression must be affine in the thrusts")
-    for what, symbol in others.items():
+    for part, symbol in others.items():
         if ca.depends_on(ca.SX(symbol), unknown):
-            raise ConfigError(f"{row}: its {what} must not depend on the thrusts")
+            raise ConfigError(f"{row}: its {part} must not depend on the thrusts")
 
 
 @dataclass(frozen=True, kw_only=True)

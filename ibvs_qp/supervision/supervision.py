@@ -167,17 +167,17 @@ class Supervision:
         lower = np.maximum(reported[0], found[0])
         return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
-    def reference(self, wanted: Reference) -> Reference:
+    def reference(self, requested: Reference) -> Reference:
         """The reference that the state allows in place of the caller's."""
         state, last = self.state, self._last
         if state is SafetyState.NOMINAL or last is None:
-            return wanted
+            return requested
         if state is SafetyState.DEGRADED:  # no travel, and no new contact
-            pressing = wanted.contact and last.contact.in_contact
-            stop = wanted.standoff if not wanted.contact else max(last.contact.distance, LEAST_STOP)
-            return dataclasses.replace(wanted, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
+            pressing = requested.contact and last.contact.in_contact
+            stop = requested.standoff if not requested.contact else max(last.contact.distance, LEAST_STOP)
+            return dataclasses.replace(requested, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
         down = np.array((0.0, self._descend_speed)) if state is SafetyState.DESCEND else _STILL
-        return Reference(standoff=self._retreat_m, velocity=down, tilt=wanted.tilt, trim=wanted.trim)
+        return Reference(standoff=self._retreat_m, velocity=down, tilt=requested.tilt, trim=requested.trim)
 
     @property
     def _descend_speed(self) -> float:

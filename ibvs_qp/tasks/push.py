@@ -70,7 +70,7 @@ class PushTask(Task):
         """
         row, signals, filter_s = model.force_along_normal, model.signals, model.gains.push_filter_s
         missing = signals.state("push_target") - model.at(row, model.acceleration_commanded)
-        bound = ca.fmin(PUSH_DEFICIT_RATIO * signals.input("given_up"), PUSH_DEFICIT_BOUND)
+        bound = ca.fmin(PUSH_DEFICIT_RATIO * signals.input("unallocated"), PUSH_DEFICIT_BOUND)
         deficit = clamp(missing, -bound, bound)
         filtered = model.filtered(target, row, filter_s) + model.filter_share(filter_s) * deficit
         return signals.remember("push_target", filtered)

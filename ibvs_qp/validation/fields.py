@@ -54,7 +54,7 @@ class Field:
         return -1.0 if self.unit_length else min(self.high, -self.low)
 
     def entries(self, value: Any) -> list[float] | None:
-        """Numbers of a value, one for a plain number; None if it is no such value."""
+        """Numbers of a value, one for a plain number; None for an invalid one."""
         if self.size == 0:
             only = number(value)
             return None if only is None else [only]

@@ -37,7 +37,7 @@ def read_lines(
     """The accepted ones of the first ``most`` lines or line references; the same tuple if it is plain.
 
     Args:
-        lines: Whatever the caller passed.
+        lines: Any input of the caller.
         read: `read_line` or `read_line_reference`.
         most: Largest number of checked entries: a tick has a deadline.
         name: Of the input.

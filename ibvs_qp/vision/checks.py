@@ -81,8 +81,8 @@ class PictureGate:
         self._seen = self._seen + 1 if self._other == camera else 1
         self._other = camera
         if self._seen < STEADY_PICTURES:
-            what = "size" if self._camera[:2] != camera[:2] else "intrinsics"
-            return f"another {what} than the pictures before, {self._seen} of {STEADY_PICTURES} until it is followed"
+            other = "size" if self._camera[:2] != camera[:2] else "intrinsics"
+            return f"another {other} than the pictures before, {self._seen} of {STEADY_PICTURES} until it is followed"
         self._camera, self._other = camera, None
         return None
 
@@ -97,7 +97,7 @@ def _unit_problem(depth: np.ndarray) -> str | None:
     return f"depth picture with a median of {median:.4g}: metres are needed, these look like millimetres"
 
 
-#: Tells the time of the stages [s]: by the wall. A bench puts the thread's own time here, undisturbed by neighbours.
+#: Clock of the stages [s]: wall-clock time. A bench puts the CPU time of the thread here.
 stage_time: Callable[[], float] = time.perf_counter
 
 

@@ -13,7 +13,7 @@ from ibvs_qp.vision.picture.picture import denormalise
 _SURFACE, _MASK = (60, 220, 90), (200, 60, 60)
 _KINDS = {"board": (255, 160, 0), "paint": (255, 0, 200), "": (120, 120, 120)}
 _FAINT, _INK, _GROUND = (150, 150, 150), (255, 255, 255), (20, 20, 20)
-#: Share of a tint in the picture; length of the tick towards the surface [px]; size of the text.
+#: Weight of a tint in the picture; length of the tick towards the surface [px]; size of the text.
 _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
 #: Font, margin of the ground around the text, and distance of a label from its line [px].
 _FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10

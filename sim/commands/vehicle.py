@@ -100,7 +100,7 @@ def read_vehicle(file: Path) -> VehicleFile:
 
 
 def vehicle_toml(given: VehicleFile) -> str:
-    """A file with [vehicle]; lines of what its source did not state are comments that say so."""
+    """A file with [vehicle]; keys that its source lacks are comments."""
     import tomli_w
 
     from ibvs_qp.config.settings import to_dict

@@ -22,7 +22,7 @@ class DetectedLine:
         theta: Angle of the normal [rad].
         covariance: Of (rho, theta), (2, 2).
         score: 0..1, how well it fits what is asked for; ranks lines of one picture.
-        confidence: 0..1, share of such lines that are right; 0.8 and more is sure.
+        confidence: 0..1, fraction of such lines that are right; 0.8 and more is sure.
         borders_plane: Whether the surface ends there.
         surface_side: +1 if the surface lies on the side the normal (cos, sin) points to, -1 on the other, 0 unknown.
         line_id: Identity of a track, kept from picture to picture of a followed sequence; lines without a track are

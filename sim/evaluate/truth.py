@@ -36,7 +36,7 @@ TICKS_S = 0.02
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Assessment:
     """A flight against its job.
 
     Args:
@@ -100,7 +100,7 @@ class Judgement:
             yield f"contact in {100.0 * share:.1f} % of painting, {100.0 * self.least_contact:g} % needed"
 
     def _legs(self, legs: Sequence[tuple[float, float]]) -> Iterator[str]:
-        """Legs of a strategy of the user's by the way of the tip in contact; without legs only its claim can tell."""
+        """Legs of a strategy of the user's by the way of the tip in contact; without legs only its claim counts."""
         if not legs and not self.trace.claimed:
             yield self.trace.reason
         for number, (right, down) in enumerate(legs, start=1):

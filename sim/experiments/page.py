@@ -19,16 +19,16 @@ _OVERVIEW = "worlds"
 
 
 def _claims(tables: Sequence[pl.DataFrame]) -> str:
-    """How many flights were judged by the truth, and how many of them the pilot claims wrongly."""
-    judged = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
+    """How many flights were checked by the truth, and how many of them the pilot claims wrongly."""
+    checked = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
     text = ""
-    if judged:
+    if checked:
         claims = sum(map(false_claims, tables))
-        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {judged} flights.\n"
-    if older := sum(map(len, tables)) - judged:
+        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {checked} flights.\n"
+    if older := sum(map(len, tables)) - checked:
         text += (
-            f"{older} flights are older than the judgement by the truth: they *ended as planned* by the pilot's claim "
-            "([experiments](../experiments.md) has them judged again by their figures).\n"
+            f"{older} flights are older than the assessment by the truth: they *ended as planned* by the pilot's claim "
+            "([experiments](../experiments.md) has them scored again by their figures).\n"
         )
     return text
 

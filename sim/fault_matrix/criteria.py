@@ -114,7 +114,7 @@ def _outcome(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken
 
 
 def _states(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken]:
-    """What the supervisor did, and whether it said why."""
+    """Actions of the supervisor, and whether it gave reasons."""
     if flown["state_before"] > 0.0:
         yield Broken("false alarm", f"{STATES[int(flown['state_before'])]} before the fault")
     if severity(expected.reach) > 0:

@@ -112,7 +112,7 @@ class FeatureNan(FeatureFault):
     once: bool = setting(True, "in one picture only")
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
-        """As all, but for one picture."""
+        """As all, except for one picture."""
         every, spoilt = super().filter(rng), []
 
         def first(frame: SensorFrame) -> SensorFrame | None:

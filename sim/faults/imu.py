@@ -65,7 +65,7 @@ class ImuLate(SensorFault):
 class ImuNan(SensorFault):
     """Values that are no numbers."""
 
-    output: str = choice("all", "what is no number", ("all", *OUTPUTS))
+    output: str = choice("all", "outputs that are NaN", ("all", *OUTPUTS))
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """NaN in every entry."""

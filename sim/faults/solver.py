@@ -19,7 +19,7 @@ def qp_engine(pilot: Pilot) -> Any:
     """The engine of the pilot's QP law.
 
     Raises:
-        ConfigError: When the pilot flies another law.
+        ConfigError: When the pilot has another law.
     """
     engine = getattr(pilot.controller, "engine", None)
     if engine is None:

@@ -88,8 +88,8 @@ def assemble(flown: Flown, rows: LoggedRows) -> dict[str, np.ndarray]:
     arrays["active"], arrays["limit_price"] = active, price
     if rows.program is not None:
         arrays["program"] = rows.program
-    believed = flown.config.controller.vehicle
-    arrays["thrust_min"], arrays["thrust_max"] = believed.thrust_min, believed.thrust_max
+    nominal = flown.config.controller.vehicle
+    arrays["thrust_min"], arrays["thrust_max"] = nominal.thrust_min, nominal.thrust_max
     arrays["true_thrust_min"], arrays["true_thrust_max"] = rows.thrust_limits
     arrays["true_mass"] = np.array([flown.vehicle.mass_kg])
     arrays["vision_ms"] = np.array(rows.vision_ms, float)

@@ -21,7 +21,7 @@ class ContactView:
 
     Args:
         pattern: Directions of the strokes.
-        config: The vehicle as the controller believes it, its bounds of the view, and the shortest line.
+        config: The nominal vehicle of the controller, its bounds of the view, and the shortest line.
         brush_width_m: Diameter of the brush, which hides the wall [m].
     """
 

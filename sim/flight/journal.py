@@ -91,5 +91,5 @@ class Journal:
             work()
         except OSError as error:
             raise IbvsQpError(
-                f"cannot write the log of the flight: {error.strerror or error}; what was written is in {self._folder}"
+                f"cannot write the log of the flight: {error.strerror or error}; its first part is in {self._folder}"
             ) from None

@@ -1,7 +1,7 @@
 """Checks of a job before its flight: what board, strokes, brush, camera, sensors and colours cannot do together.
 
 Every limit follows from a setting or from geometry; a truth of the plant, such as a wrong mass, is never refused here,
-but for motors that are much slower than the vehicle's.
+except for motors that are much slower than the vehicle's.
 """
 
 from __future__ import annotations
@@ -317,7 +317,7 @@ def _motors(scene: Scene, config: PilotConfig) -> Iterator[str]:
 
 
 def _colours(scene: Scene, config: PilotConfig) -> Iterator[str]:
-    """Board, wall and paint are told apart by colour, whatever the gap between board and wall."""
+    """Board, wall and paint differ in colour, at any gap between board and wall."""
     gate = config.vision.line.color_gate
     colors = {"board": scene.board.color, "wall": scene.wall.color, "paint": scene.paint.color}
     for one, other in (("paint", "board"), ("wall", "board"), ("wall", "paint")):

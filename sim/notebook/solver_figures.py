@@ -55,7 +55,7 @@ def draw_race(results: Sequence[Result]) -> Figure:
 
 
 def _write_names(figure: Figure, axes: Axes, results: Sequence[Result], places: list[tuple[float, float]]) -> None:
-    """Write the names beside their dots without overlaps with each other, dots or lines."""
+    """Write the names next to their dots without overlaps with each other, dots or lines."""
     figure.draw_without_rendering()
     points = [axes.transData.transform(line.get_xydata()) for line in axes.lines[: 2 * len(results)]]
     taken = [Bbox((each.min(axis=0) - _DOT_PX, each.max(axis=0) + _DOT_PX)) for each in points]

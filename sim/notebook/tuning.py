@@ -155,7 +155,7 @@ def load_setting(preset: str) -> Setting:
     """A setting from a preset: a shipped one by name, or a file, with the scene that `save_setting` put beside it.
 
     Raises:
-        ConfigError: When it cannot be read, flies the analytic law, or the rotors have different limits.
+        ConfigError: When it cannot be read, has the analytic law, or the rotors have different limits.
     """
     file = _path(preset)
     if not file.exists():

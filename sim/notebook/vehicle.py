@@ -45,7 +45,7 @@ class Case:
     """A vehicle and the state of its rotors."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)  # mass, geometry, limits, tip
-    weak_rotor: str = ""  # name of a rotor with less thrust; empty if there is none
+    weak_rotor: str = ""  # name of a rotor with less thrust; empty without one
     fraction: float = 1.0  # part of its full thrust that remains; 0 is a lost rotor
 
     @property
@@ -112,7 +112,7 @@ class Case:
         r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
 
         With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in
-        (a, b). A large square is clipped with one after the other.
+        (a, b). A large square is clipped with each in sequence.
 
         Args:
             origin: Wrench w_0, (6,) [N, N m].
@@ -225,6 +225,6 @@ def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> 
 
 
 def cheapest(designs: pl.DataFrame) -> Case | None:
-    """The design that meets all duties with the least hover power; None if there is none on the map."""
+    """The design that meets all duties with the least hover power; None without one on the map."""
     best = designs.filter(pl.col("margin") >= 0.0).sort("power_w").head(1).to_dicts()
     return vehicle_case(mass_kg=best[0]["mass_kg"], tilt_deg=best[0]["tilt_deg"]) if best else None

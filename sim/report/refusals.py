@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: A block of the page: modules or folders, then their texts.
 _BLOCK = re.compile(r"<!-- (?P<places>[\w/. ]+): generated -->\n.*?<!-- end of texts -->", re.DOTALL)
-#: Folders and modules that step in flight or say why a flight ended: every sentence in them is a message.
+#: Folders and modules that step in flight or give the reason of its end: every sentence in them is a message.
 _IN_FLIGHT = (
     "ibvs_qp/bridge/bridge.py ibvs_qp/bridge/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
     "ibvs_qp/estimation ibvs_qp/symbolic/machine_code.py ibvs_qp/model/reporting.py ibvs_qp/qp/compiled.py "

@@ -177,7 +177,7 @@ def _score(trial: optuna.trial.FrozenTrial) -> Score:
 
 
 def _key(values: Values) -> tuple[float, ...]:
-    """Values as flown, in alphabetical order."""
+    """Values of the flights, in alphabetical order."""
     return tuple(value for _, value in sorted(rounded(values).items()))
 
 

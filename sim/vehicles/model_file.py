@@ -33,7 +33,7 @@ _ROTOR = re.compile(r"rotor|prop", re.IGNORECASE)
 _ASSUMED_RATIO_M = 0.02
 #: A moment per thrust below this is none [m].
 _LEAST_RATIO_M = 1e-6
-#: Greatest moment that a site's force has beside its axis, as a share of the moment [-].
+#: Greatest moment that a site's force has about other axes, as a fraction of the moment [-].
 _BESIDE = 0.01
 
 

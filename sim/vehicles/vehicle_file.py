@@ -45,7 +45,7 @@ class VehicleFile:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What a flight assumes beside the file, in words; a key that TOML leaves out is the Tarot's by definition."""
+        """Assumptions of a flight in addition to the file, in words; keys missing in TOML are the Tarot's."""
         if self.kind == "TOML":
             return ()
         return (f"{self.kind} without {', '.join(self.assumed)}: those of the Tarot T960", *self.notes)

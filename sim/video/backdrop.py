@@ -26,7 +26,7 @@ class Backdrop:
 
     Attributes:
         colour: The picture at the rasterizer's size, red, green, blue 0..1, float32.
-        on_board: Share of every pixel of the finished picture that shows the board, float32.
+        on_board: Fraction of every pixel of the finished picture that shows the board, float32.
     """
 
     def __init__(self, canvas: Canvas, rasterizer: Rasterizer) -> None:

@@ -136,7 +136,7 @@ class Canvas:
 
     @property
     def coverage(self) -> np.ndarray:
-        """Share of every pixel that is painted, float32 0..1, (height, width)."""
+        """Fraction of every pixel that is painted, float32 0..1, (height, width)."""
         self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 

@@ -68,7 +68,7 @@ RANGES = {
 SPARE = Range(
     low=0.0, high=0.08, unit="m", reason="a row ends at the margin on the left and begins freely on the right"
 )
-#: True over believed mass of the vehicle [-].
+#: True over nominal mass of the vehicle [-].
 MASS = Range(low=0.95, high=1.05, reason="another battery, a fuller brush; 0.3 kg of 6 kg")
 
 

@@ -36,7 +36,7 @@ _ROUNDS, _ROUNDS_KNOWN = 8, 2
 _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
 #: Largest residual of a field, as a fraction of that of two materials in even light, see `_left_by_two_materials`.
 #: Light on a board leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board
-#: beside a grey wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board
+#: next to a grey wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board
 #: 0.7 at least. Taken for light a step costs the edge.
 _UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].

@@ -251,10 +251,10 @@ def _middle(one, two, three):
 
 
 @inner
-def _any(states, first, last, wanted):
+def _any(states, first, last, value):
     """Whether one of the states is the requested one."""
     for d in range(first, last):
-        if states[d] == wanted:
+        if states[d] == value:
             return True
     return False
 

@@ -253,7 +253,7 @@ def _edge_points(small, mask, factor, region, row_of, column_of):
 
 
 @kernel("i4[:, ::1](f8[:, ::1], i8[::1], b1[::1], f8[:, ::1], i8)")
-def _votes(points, first, wanted, normals, reach):
+def _votes(points, first, chosen, normals, reach):
     """Votes for lines by the degree of their normal and distance from the middle plus reach, (360, 2 reach + 1)."""
     votes = np.zeros((_ANGLES, 2 * reach + 1), np.int32)
     for degree in range(_ANGLES):
@@ -261,7 +261,7 @@ def _votes(points, first, wanted, normals, reach):
             weight = 2 if points[i, 4] > 2.0 * _GRADIENT else 1
             for turn in range(-_VOTES_WITHIN, _VOTES_WITHIN + 1):
                 k = (degree + turn) % _ANGLES
-                if wanted[k]:
+                if chosen[k]:
                     away = points[i, 0] * normals[0, k] + points[i, 1] * normals[1, k]
                     votes[k, int(away + reach + 0.5)] += weight
     return votes

@@ -14,7 +14,7 @@ from ibvs_qp.vision.paper.normals import NormalImage
 _IN_A_ROW = 2
 #: Rays that must agree on a side, as a number, and as a fraction of those that ended there.
 _VOTES, _MOST = 3, 0.5
-#: Share of readings in the seed's window, and on the surface, that must exist.
+#: Fraction of readings in the seed's window, and on the surface, that must exist.
 _VALID = 0.25
 #: Normals in the box are averaged over a grid of about this many columns.
 _COLUMNS = 80
@@ -35,7 +35,7 @@ class SurfaceBox:
         distance_m: Distance of the camera centre from the surface [m].
         normal_sigma: Standard deviation of the mean normal per axis [rad].
         distance_sigma_m: Standard deviation of the distance [m].
-        inlier_share: Share of the readings in the box that have the surface's normal.
+        inlier_share: Fraction of the readings in the box that have the surface's normal.
         residual_sigma: Spread of the readings about the plane, fraction of depth.
     """
 

@@ -69,7 +69,7 @@ def candidate(
     Args:
         ends: (2, 2) [px].
         upright: Whether it is an upright one.
-        box: Tells on which side the surface lies.
+        box: Shows on which side the surface lies.
         intrinsics: (fx, fy, cx, cy) [px].
         width: Of the picture [px].
         sigma_px: Error of an end [px].

@@ -84,8 +84,8 @@ class RgbdCameraSettings:
             return np.array(self.depth_rotation).reshape(3, 3)
         return rotation_from_vector(self.depth_rotation or (0.0, 0.0, 0.0))
 
-    def _require_count(self, name: str, counts: tuple[int, ...], what: str) -> None:
-        value, allowed = getattr(self, name), f"{what}: {', '.join(map(str, counts))}"
+    def _require_count(self, name: str, counts: tuple[int, ...], content: str) -> None:
+        value, allowed = getattr(self, name), f"{content}: {', '.join(map(str, counts))}"
         if len(value) not in counts:
             raise out_of_range(name, value, "px" if name == "depth_intrinsics" else "", allowed)
 

@@ -122,8 +122,8 @@ def refit_plane(
         if searched:
             some = relative[component.reshape(-1)][:: max(1, count // _SPREAD)]
             spread = MAD_TO_SIGMA * median(np.abs(some - median(some)))
-        wanted = config.fine_gate_sigmas * (spread if sigma is None else sigma)
-        gate = min(max(wanted, config.fine_gate_low), config.fine_gate_high)
+        gate = config.fine_gate_sigmas * (spread if sigma is None else sigma)
+        gate = min(max(gate, config.fine_gate_low), config.fine_gate_high)
     length = math.hypot(*plane.tolist())
     upright = float(plane[2]) > math.cos(math.radians(config.max_oblique_deg)) * length
     if down is not None:

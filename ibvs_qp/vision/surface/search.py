@@ -67,12 +67,12 @@ class PlaneSearch:
         values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
-        for index, wanted in self._attempts(order, values, seeds, prefer):
-            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
+        for index, labels in self._attempts(order, values, seeds, prefer):
+            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, labels)
             if start is None:
                 reason = "no plane through the seed stands upright and faces the camera"
                 continue
-            result = refit_plane(grid, inverse, wanted, start, down, self._config, seed=seeds[index])
+            result = refit_plane(grid, inverse, labels, start, down, self._config, seed=seeds[index])
             if isinstance(result, PlaneEstimate):
                 return result
             reason = result

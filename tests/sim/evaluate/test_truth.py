@@ -13,7 +13,7 @@ from synthetic_trace import Errors, synthetic_trace
 from sim.evaluate.flight_table import false_claims
 from sim.evaluate.metrics import compute_metrics
 from sim.evaluate.strokes import painted_strokes
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.flight.trace import INTERRUPTED, KILLED, Event, Trace
 from sim.world.board import BoardGeometry
 from sim.world.scene import BoardScene, PaintScene, Scene, WindScene
@@ -25,7 +25,7 @@ PATTERNS = [(kind, f"{high}-{side}") for kind in ("rows", "columns") for high in
 
 
 def shortfall(trace: Trace) -> str | None:
-    return Judgement(trace).shortfall
+    return Assessment(trace).shortfall
 
 
 def three_rows(*offsets: float, **errors: float) -> Trace:

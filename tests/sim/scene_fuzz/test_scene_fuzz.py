@@ -9,8 +9,8 @@ from sim.flight.options import FlightOptions
 from sim.flight.preflight import job_problems
 from sim.scene_fuzz import __main__ as command
 from sim.scene_fuzz import judge as judging
+from sim.scene_fuzz.check import BAD, check_draw, check_file
 from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
-from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
 from sim.world.scene import Scene, load_scene
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
@@ -58,7 +58,7 @@ def test_outcome_is_what_the_truth_makes_of_the_claim(monkeypatch, completed, cl
     figures = {"completed": completed, "claimed": claimed, "not_completed": None if completed else "row 1: short"}
     figures["push_peak_ratio"] = 3.0
     monkeypatch.setattr(judging, "compute_metrics", lambda trace: figures)
-    judged = judge_draw(0, OPTIONS, "datasheet", 150.0)
+    judged = check_draw(0, OPTIONS, "datasheet", 150.0)
     assert judged.outcome == outcome and (outcome in BAD) == outcome.isupper()
     assert reason in str(judged) and str(judged).endswith("(push 3.0 x)")
 
@@ -68,13 +68,13 @@ def test_refusals_and_internal_errors_are_told_apart(monkeypatch):
         raise ZeroDivisionError("pitch")
 
     monkeypatch.setattr(judging, "fly", broken)
-    outcomes = {judge_draw(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
+    outcomes = {check_draw(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
     assert outcomes == {"refused before flight", "INTERNAL ERROR"}
 
 
 def test_a_scene_of_a_file_is_refused_by_name(tmp_path):
     (tmp_path / "thin.toml").write_text("[paint]\noverlap_m = 0.08\n")
-    judged = judge_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
+    judged = check_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
     assert judged.outcome == "refused before flight" and str(judged).startswith("thin 3: refused before flight: ")
 
 
@@ -98,7 +98,7 @@ def test_a_folder_without_scenes_is_refused(tmp_path, monkeypatch, capsys):
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + FLIGHTS))
 def test_no_drawn_scene_crashes_breaks_or_is_claimed_falsely(seed):
-    judged = judge_draw(seed, OPTIONS, "datasheet", 100.0)
+    judged = check_draw(seed, OPTIONS, "datasheet", 100.0)
     assert judged.outcome not in BAD, str(judged)
 
 
