@@ -58,16 +58,18 @@ def files(room: str) -> list[Path]:
 
 
 def pieces(path: Path) -> Iterator[Piece]:
-    """Lines of a page; comments, strings and names of a module, and its own name."""
+    """Lines of a page; comments, strings and names of a module, each name once, and its own name."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         yield from (Piece(number, line) for number, line in enumerate(text.splitlines(), 1))
         return
     yield Piece(1, words(path.stem), is_name=True)
+    names = set[str]()
     for found in tokenize.generate_tokens(io.StringIO(text).readline):
         if found.type in _TEXTS:
             yield from (Piece(found.start[0] + k, line) for k, line in enumerate(found.string.splitlines()))
-        elif found.type == token.NAME:
+        elif found.type == token.NAME and found.string not in names:
+            names.add(found.string)
             yield Piece(found.start[0], words(found.string), is_name=True)
 
 
@@ -79,9 +81,11 @@ def words(name: str) -> str:
 def hits(path: Path, room: str) -> list[str]:
     """Places of a file that use a word of the list, with the replacement."""
     rules = [rule for rule in RULES if room in rule.rooms]
+    suspect = re.compile("|".join(rule.pattern.pattern for rule in rules), re.IGNORECASE)
     found = dict.fromkeys(
         f"{path.relative_to(ROOT).as_posix()}:{piece.line}: {match[0]!r}, write: {rule.instead}"
         for piece in pieces(path)
+        if suspect.search(piece.text)
         for rule in rules
         if (rule.names or not piece.is_name) and (match := rule.pattern.search(without_kept(path, piece.text)))
     )
