@@ -153,7 +153,7 @@ def interrupted(words: Sequence[str], folder: Path, kept: str) -> int:
     Args:
         words: Arguments after ``ibvs-qp``.
         folder: Folder of the results.
-        kept: What the disk holds already.
+        kept: Present contents of the disk.
 
     Returns:
         The exit code.

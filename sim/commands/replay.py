@@ -27,11 +27,11 @@ class ReplayCommand:
     """
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
-    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also what a killed process left."""
+    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also the log of a killed process."""
     preset: Annotated[Path | None, optional("FILE")] = None
-    """Preset file (TOML), or a shipped one: show what it would have commanded on the same inputs instead."""
+    """Preset file (TOML), or a shipped one: show its commands on the same inputs instead."""
     repair: Annotated[Path | None, optional("FILE")] = None
-    """Write the log again with its end and index, for viewers that refuse what a killed process left."""
+    """Write the log again with its end and index, for viewers that refuse the log of a killed process."""
     json: Annotated[bool, flag] = False
     """Print one JSON line on standard output, and nothing else."""
 
@@ -117,7 +117,7 @@ def _preset_text(result: PresetComparison) -> list[str]:
             limits.get(name, 0) / result.ticks for limits in (result.limits_recorded, result.limits_preset)
         )
         lines.append(f"  limit {name}: active in {after:.1%} of the ticks instead of {before:.1%}")
-    lines.append("Inputs are the recorded ones: what the vehicle would have done under the preset is not in them.")
+    lines.append("Inputs are the recorded ones: they lack the reaction of the vehicle to the preset.")
     return lines
 
 

@@ -21,11 +21,11 @@ _SURE, _DASH = 0.8, 9.0
 
 
 def draw_detection(rgb: np.ndarray, result: Detection, seed: tuple[float, float] | None = None) -> np.ndarray:
-    """Draw what was found into a copy of the picture.
+    """Draw the result into a copy of the picture.
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
-        result: What was found in it.
+        result: Result of the detection.
         seed: (u, v) of the place on the surface, or None.
 
     Returns:

@@ -11,7 +11,7 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.picture.lens import Lens
 from ibvs_qp.vision.picture.picture import denormalise, normalise
 
-#: Farthest a point may lie from the corner, in widths of the picture: a lens model bends what is far outside anywhere.
+#: Farthest a point may lie from the corner, in widths of the picture: far outside a lens model is undefined.
 _FARTHEST = 2.0
 
 

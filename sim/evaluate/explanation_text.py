@@ -145,7 +145,7 @@ def _limits(explanation: Explanation) -> list[Any]:
 def _conflict(conflict: tuple[LimitValue, ...]) -> list[Any]:
     words = (
         f"[bold]No thrusts satisfy these {len(conflict)} hard limits together[/]; without any one of them a solution "
-        "exists. The vehicle flew the analytic law, clipped to the rotors' limits."
+        "exists. The analytic law had control, clipped to the rotors' limits."
     )
     rows = []
     for row in conflict:

@@ -159,7 +159,7 @@ _FIGURES = (
         lambda p: p.claimed, better=NEITHER,
     ),
     Figure(
-        "not_completed", "not completed because", "What the job lacks; a dash if nothing.",
+        "not_completed", "not completed because", "Missing condition of the job; a dash if none.",
         lambda p: p.not_completed, better=NEITHER, exactly="missing condition of `completed`, by the truth; or null",
     ),
     Figure("reason", "ended because", "Why the flight ended.", lambda p: p.reason, better=NEITHER),

@@ -1,4 +1,4 @@
-"""What the figures of a flight, or of one of its rows, are computed from."""
+"""Data for the figures of a flight, or of one of its rows."""
 
 from __future__ import annotations
 

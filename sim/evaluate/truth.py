@@ -52,7 +52,7 @@ class Assessment:
 
     @cached_property
     def shortfall(self) -> str | None:
-        """What the job lacks, named by stroke or phase; None for a completed one."""
+        """Missing condition of the job, named by stroke or phase; None for a completed one."""
         if self.trace.legs is not None:
             job = self._legs(self.trace.legs)
         else:
@@ -73,7 +73,7 @@ class Assessment:
         return ROUGH_CONTACT if rough else CONTACT
 
     def of_stroke(self, number: int) -> str | None:
-        """What a stroke lacks; None for a good one."""
+        """Missing condition of a stroke; None for a good one."""
         return "; ".join(self._stroke(number)) or None
 
     @property
@@ -82,7 +82,7 @@ class Assessment:
         return self.trace.scene.paint.pattern.removesuffix("s")
 
     def _ends(self) -> Iterator[str]:
-        """Ends of a flight that complete no job, whatever came before."""
+        """Ends of a flight that complete no job, after any course."""
         reason = self.trace.reason
         if any(reason.startswith(end) for end in (CRASH, INTERRUPTED, KILLED)) or TIME_OUT in reason:
             yield reason
@@ -175,11 +175,11 @@ class Assessment:
         if way < least:
             yield f"slid {_mm(way)}, at least {_mm(least)} needed"
 
-    def _descended(self, lasted: float, what: str = "held") -> Iterator[str]:
+    def _descended(self, lasted: float, action: str = "held") -> Iterator[str]:
         """A press that a fault ended: the plan is then to leave the wall and to land, or to descend for a time."""
         trace = self.trace
         if not any(event.kind == "fault" for event in trace.events):
-            yield f"{what} for {lasted:.1f} s, {trace.plan['press' if what == 'held' else 'paint']:g} s asked"
+            yield f"{action} for {lasted:.1f} s, {trace.plan['press' if action == 'held' else 'paint']:g} s asked"
             return
         leaving = np.flatnonzero(in_phase(trace, "retreat"))
         descended = float(trace.t[-1] - trace.t[leaving[0]]) if len(leaving) else 0.0

@@ -43,7 +43,7 @@ class Comparison:
 
 
 def _bare(variant: Variant) -> Variant:
-    """A variant without its allocator and words, to compare what else it switches."""
+    """A variant without its allocator and words, to compare its other switches."""
     switches = {name: value for name, value in variant.switches.items() if name != "allocator"}
     return dataclasses.replace(variant, words="", switches=switches, laws=(), against=())
 

@@ -42,7 +42,7 @@ def fly_part(
         runs: Flights of the table.
         chosen: Those of them to fly, of which the part is taken.
         given: Of `parse_part`.
-        words: What flies, for the progress bar.
+        words: Name of the flights, for the progress bar.
 
     Returns:
         Table of all flights in the folder with the present code, and whether the user stopped them.

@@ -1,4 +1,4 @@
-"""What each part of the controller is worth: variants against the variant that has the part, seed by seed."""
+"""Benefit of each part of the controller: variants against the variant that has the part, seed by seed."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from sim.sweep.statistics import completed, median_interval, select
 _REALISTIC = ("datasheet", "harsh")
 #: Metrics that were published.
 _METRICS = ("path_rms_straight_m", "force_rms_straight_n")
-#: Flights of others: what flew, path, push.
+#: Flights of others: vehicle, path, push.
 _FLIGHTS = (
     ("real flight, another vehicle of this class: Guo, He et al., *Flying Calligrapher*, RA-L 2024", "29 mm", "0.7 N"),
     ("real flight, quadrotor with a delta arm and motion capture: Tzoumanikas et al., RSS 2020", "millimetres", "–"),

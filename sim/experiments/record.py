@@ -120,9 +120,9 @@ def write_page(
         folder: Folder of the page, with logs in its ``parts``.
         experiments: The flown experiments.
         table: Their rows.
-        lead: A sentence on what was flown.
+        lead: A sentence on the flights.
         command: Command that repeats one experiment, with ``{name}`` in the place of its name.
-        name: What was flown: an experiment, or "all".
+        name: Of the flights: an experiment, or "all".
     """
     sections = []
     with styled():

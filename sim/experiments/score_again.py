@@ -3,7 +3,7 @@
 ``python -m sim.experiments.score_again docs/experiments/all.parquet`` prints the section of docs/experiments.md.
 
 A table from before `sim.evaluate.truth` has the pilot's claim as ``completed``, and no place of a stroke. Its figures
-still decide many flights: without data on a condition, only what follows from the others counts.
+still decide many flights: without data on a condition, only the others count.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HOLDS, FAILS, OPEN = "no fault found", "fails", "not decided"
 
 
 def score(row: dict[str, Any], run: Run) -> tuple[str, str]:
-    """Outcome of a claimed flight by its stored figures, and what failed or what is unknown."""
+    """Outcome of a claimed flight by its stored figures, and the failed or unknown criterion."""
     figures = {name: value for name, value in row.items() if isinstance(value, float) and math.isfinite(value)}
     return _paint(figures, run) if isinstance(run.plan.job, PaintJob) else _press(figures, run)
 

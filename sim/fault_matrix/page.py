@@ -57,7 +57,7 @@ def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, comman
     Args:
         verdicts: The rows.
         hovers: Remaining hovers after faults of rotors.
-        lead: A sentence on what was flown.
+        lead: A sentence on the flights.
         command: Command that repeats it.
         vehicle: Limits of the thrusts.
     """
@@ -136,8 +136,8 @@ def _failures(verdicts: Sequence[Verdict]) -> str:
     lines = []
     for verdict in verdicts:
         for world, seed, criteria in verdict.flown.failures[:LISTED]:
-            what = "; ".join(criterion.text for criterion in criteria)
-            lines.append(f"- {verdict.row.name}, {verdict.place}, {world}, seed {seed}: {what}\n")
+            failed = "; ".join(criterion.text for criterion in criteria)
+            lines.append(f"- {verdict.row.name}, {verdict.place}, {world}, seed {seed}: {failed}\n")
         if (more := len(verdict.flown.failures) - LISTED) > 0:
             lines.append(f"- {verdict.row.name}, {verdict.place}: {more} more\n")
     return "".join(lines)

@@ -23,7 +23,7 @@ def summary(verdicts: Sequence[Verdict], folder: Path, facts: dict[str, Any]) ->
     Args:
         verdicts: The rows.
         folder: Folder of the run.
-        facts: What was flown: command, version, seed and so on.
+        facts: Of the flights: command, version, seed and so on.
     """
     flown = [verdict for verdict in verdicts if verdict.flown.n]
     return {

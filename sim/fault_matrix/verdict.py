@@ -1,4 +1,4 @@
-"""Verdict on every row of the matrix at a place: flights that passed, worst figures, and what the control row did."""
+"""Verdict on every row of the matrix at a place: flights that passed, worst figures, and result of the control row."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Verdict:
 
     @property
     def expected(self) -> Expected:
-        """What must happen here."""
+        """Expectation at this place."""
         return self.row.places[self.place]
 
     @property

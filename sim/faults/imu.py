@@ -15,7 +15,7 @@ from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.quaternion import multiply
 from sim.faults.fault import FrameFilter, SensorFault
 
-#: What the unit delivers, with the entries of each.
+#: Outputs of the unit, with the entries of each.
 OUTPUTS = {"attitude": 4, "angular_velocity": 3, "specific_force": 3}
 
 

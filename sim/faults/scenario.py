@@ -1,4 +1,4 @@
-"""The fault matrix as data: rows of ``scenarios/*.toml``, each a fault, where it strikes, and what must happen."""
+"""The fault matrix as data: rows of ``scenarios/*.toml``, each a fault, its place, and the expectation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STATES = tuple(str(state) for state in SafetyState)
 
 @dataclass(frozen=True, kw_only=True)
 class Expected(Checked):
-    """What must happen at one place."""
+    """Expectation at one place."""
 
     reach: str = choice("nominal", "this state or a more severe one must be reached", _STATES)
     within_s: float = setting(0.3, "latest, after the fault can be observed", unit="s", low=0.0, high=60.0)
@@ -55,7 +55,7 @@ class Scenario(Checked):
 
     @property
     def places(self) -> dict[str, Expected]:
-        """What must happen, by place."""
+        """Expectations by place."""
         given = {"contact": self.contact, "free": self.free}
         return {place: expected for place, expected in given.items() if expected is not None}
 

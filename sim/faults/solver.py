@@ -43,7 +43,7 @@ class SolverFault(Fault):
 
     @abstractmethod
     def solution(self, engine: Any, solve: Callable[[], Any]) -> Callable[[], Any]:
-        """What is called instead of ``solve``."""
+        """Function in place of ``solve``."""
 
 
 @dataclass(frozen=True, kw_only=True)

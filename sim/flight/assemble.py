@@ -1,4 +1,4 @@
-"""Rows of a log into the named arrays of a trace: after the flight, or from what a killed flight left on disk."""
+"""Rows of a log into the named arrays of a trace: after the flight, or from the log of a killed flight on disk."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PRESSED = [PHASES.index(phase) for phase in ("paint", "retouch", "climb")]
 
 @dataclass(frozen=True, kw_only=True)
 class Flown:
-    """Who flew where: what the rows of a log mean depends on it."""
+    """Law, vehicle and scene of a log, which its rows depend on."""
 
     scene: Scene
     seed: int
@@ -53,7 +53,7 @@ class Flown:
 
 @dataclass(kw_only=True)
 class LoggedRows:
-    """What a recorder logged."""
+    """Contents of a recorder's log."""
 
     columns: dict[str, np.ndarray]  # (N,) or (N, width)
     program: np.ndarray | None  # (N, P)

@@ -55,7 +55,7 @@ class Journal:
         self._call(lambda: self._open(header))
 
     def append(self, logs: Sequence[np.ndarray], programs: Sequence[np.ndarray], note: dict[str, Any]) -> None:
-        """Append a chunk: rows of the log and of the program, and what else happened.
+        """Append a chunk: rows of the log and of the program, and events.
 
         Args:
             logs: Numbers of every tick, (columns,) each.

@@ -31,7 +31,7 @@ STYLES = {
 }
 #: Limits shown at most, and decades of their colour scale.
 MOST_LIMITS, DECADES = 7, 4.0
-#: The tilt bound is drawn below this many times the greatest tilt; top of its axes over what they show [-].
+#: The tilt bound is drawn below this many times the greatest tilt; top of its axes over the largest value [-].
 NEAR_BOUND, TILT_HEADROOM = 1.5, 1.2
 #: One dot of force per so many ticks.
 EVERY = 8

@@ -1,4 +1,4 @@
-"""Notebook 04: what a vehicle can do in level flight at a wall, what the loss of a rotor leaves, choice of a design."""
+"""Notebook 04: actuation in level flight at a wall and after the loss of a rotor, choice of a design."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TRAVELS = {"up": (0.0, 0.0, -1.0), "sideways": (0.0, 1.0, 0.0), "down": (0.0, 0.
 FRONT, RIGHT, DOWN, ROLL, PITCH, YAW = np.eye(6)
 #: Half size of the square that a cut starts from [N, N m], and area below which a cut is empty.
 LARGEST, EMPTY_AREA = 1e4, 1e-6
-#: Weight of what must be kept over what is minimised after the loss of a rotor, and its largest residual [N, N m].
+#: Weight of the kept over the minimised quantities after the loss of a rotor, and its largest residual [N, N m].
 KEEP_WEIGHT, KEPT = 1e4, 1e-2
 
 _facets = functools.lru_cache(maxsize=64)(WrenchFacets)
@@ -170,7 +170,7 @@ def abilities(case: Case, friction: float) -> dict[str, float]:
 
 
 def after_loss(case: Case) -> tuple[float, float, float]:
-    """What level flight without roll and pitch moment costs after the loss of a rotor; NaN where it is impossible.
+    """Cost of level flight without roll and pitch moment after the loss of a rotor; NaN where it is impossible.
 
     Returns:
         Least horizontal force without yaw moment [N], the lean that balances this force [deg], and the least yaw

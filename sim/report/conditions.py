@@ -1,4 +1,4 @@
-"""What two runs did not have in common: options, scene and presets, key by key."""
+"""Differences of two runs: options, scene and presets, key by key."""
 
 from __future__ import annotations
 

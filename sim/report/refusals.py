@@ -28,14 +28,14 @@ _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|pr
 _INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py")
 #: Calls whose texts document settings.
 _DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split", "kernel"}
-#: What a logger fills in, and marks of a console.
+#: Placeholders of a logger, and marks of a console.
 _FILLED_IN, _MARKUP = re.compile(r"%[rs]"), re.compile(r"\[(bold|/)\]")
 #: Errors that only a fault of the project's own code raises.
 _OWN_FAULTS = {"AttributeError", "KeyError", "MemoryError", "RuntimeError", "LookupError", "TypeError"}
 
 
 def texts_of(source: str, in_flight: bool) -> list[str]:
-    """Sentences of a module that a user may read, without repetition; an ellipsis stands for what is filled in.
+    """Sentences of a module that a user may read, without repetition; an ellipsis stands for a value.
 
     Args:
         source: Text of the module.

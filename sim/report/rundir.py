@@ -77,7 +77,7 @@ class RunFolder:
 
         Args:
             out: The folder, or None.
-            resume: Whether the command continues what it finds there; only a run of `paint` is then refused.
+            resume: Whether the command continues the run in the folder; only a run of `paint` is then refused.
             overwrite: Whether a run in it may be replaced.
 
         Yields:

@@ -25,7 +25,7 @@ class SensorSuite:
         self.force_torque = ForceTorque(scene.force_torque, scene.errors.force_torque, self.vehicle, seed)
 
     def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
-        """What the vehicle delivers at this control tick, with the picture or the features that are due."""
+        """Sensor frame of this control tick, with the picture or the features that are due."""
         imu, force_torque = self.imu, self.force_torque
         imu.sample(plant)
         force_torque.sample(plant)

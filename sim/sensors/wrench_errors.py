@@ -19,7 +19,7 @@ _NS_PER_MIN = 60e9
 
 
 class WrenchErrors:
-    """What a flight's force/torque sensor reads instead of a wrench.
+    """Reading of a flight's force/torque sensor in place of a wrench.
 
     Args:
         errors: Sizes.

@@ -32,7 +32,7 @@ def gain_over(score: Score, shipped: Score) -> float:
 
 
 def cost(score: Score, shipped: Score) -> float:
-    """What the search minimises: `gain_over`, and steeply more beyond the bound of an objective."""
+    """Cost of the search: `gain_over`, and steeply more beyond the bound of an objective."""
     beyond = sum(max(0.0, each) for each in _beyond(score, shipped))
     return gain_over(score, shipped) + STEEP * beyond
 

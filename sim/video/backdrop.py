@@ -1,4 +1,4 @@
-"""What stands still in the picture from outside: wall, floor, and the board with the paint of the moment."""
+"""Static part of the picture from outside: wall, floor, and the board with the paint of the moment."""
 
 from __future__ import annotations
 

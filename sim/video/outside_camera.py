@@ -22,7 +22,7 @@ class OutsideCamera:
     """A pinhole camera with upright picture, in MuJoCo's world (x into the wall, y left, z up)."""
 
     eye: np.ndarray  # position [m], (3,)
-    target: np.ndarray  # what its axis points at [m], (3,)
+    target: np.ndarray  # point on its axis [m], (3,)
     size: tuple[int, int]  # (width, height) of the picture [px]
 
     @classmethod
@@ -30,7 +30,7 @@ class OutsideCamera:
         """The nearest camera in the fixed direction that has all points in its picture.
 
         Args:
-            points: What must be visible, MuJoCo's world [m], (N, 3).
+            points: Points that must be visible, MuJoCo's world [m], (N, 3).
             size: (width, height) of the picture [px].
         """
         azimuth, elevation = math.radians(AZIMUTH_DEG), math.radians(ELEVATION_DEG)

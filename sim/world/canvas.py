@@ -190,7 +190,7 @@ class Canvas:
         )
 
     def refresh(self) -> Box | None:
-        """Bring `texture` up to date with all strokes; returns what may have changed in it, or None."""
+        """Bring `texture` up to date with all strokes; returns the changed part, or None."""
         self._draw_stamps()
         box, self._dirty = self._dirty, None
         if box is None:

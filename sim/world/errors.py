@@ -1,6 +1,6 @@
 """Errors of a real vehicle and its sensors, beyond the noise of the scene's sensors; all zero is the ideal world.
 
-Every number is a size. What a flight gets is drawn from its seed: a bias has this length and a random direction, a
+Every number is a size. The errors of a flight are drawn from its seed: a bias has this length and a random direction, a
 calibration error is normal with this standard deviation. Four profiles (`sim/world/profiles`) fill the sections.
 """
 

@@ -19,7 +19,7 @@ from sim.world.scene import Color, Scene
 
 #: Families of scenes. Texture seeds of the first are even, of the second odd: no scene belongs to both.
 TUNING, EVALUATION = FAMILIES = ("tuning", "evaluation")
-#: Number of texture seeds of a family; twice as many are within what a scene allows [-].
+#: Number of texture seeds of a family; a scene allows twice as many [-].
 TEXTURES = 2**30
 #: Least distance of two of the colours of board, wall and paint [grey levels, RGB norm]: that of board and wall in the
 #: scene low_contrast is 83; twice the gate of 42 within which vision takes a colour for the board's or the paint's.

@@ -44,7 +44,7 @@ def true_vehicle(scene: Scene, nominal: VehicleParams, seed: int = 0) -> TrueVeh
     """The vehicle that flies in a scene.
 
     Args:
-        scene: Its section ``plant`` states what differs, ``errors`` the sizes of what is drawn.
+        scene: Its section ``plant`` states the differences, ``errors`` the sizes of the drawn ones.
         nominal: Vehicle of the controller.
         seed: Draws signs and directions of the errors.
 

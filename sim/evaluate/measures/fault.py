@@ -1,4 +1,4 @@
-"""Figures of a flight with a fault: what the vehicle and its commands did, and when the supervisor acted."""
+"""Figures of a flight with a fault: motion and commands of the vehicle, and times of the supervisor."""
 
 from __future__ import annotations
 

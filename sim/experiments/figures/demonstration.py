@@ -93,7 +93,7 @@ def _board(axes: Axes, trace: Trace) -> None:
 
 
 def _trajectory(axes: Axes, trace: Trace) -> None:
-    """Oblique view: the wall lies in the page, what is off the wall goes down to the right."""
+    """Oblique view: the wall lies in the page, points off the wall go down to the right."""
     along, up = BoardGeometry(trace.scene).board_coordinates(trace.tip[:, 1:]).T
     off = np.maximum(-trace.tip[:, 0], 0.0)
     width = trace.scene.board.width_m

@@ -13,7 +13,7 @@ from sim.sensors.cameras.timing import DeliveryErrors
 from sim.world.scene import CameraScene
 
 NS_PER_S = 1_000_000_000
-#: What a sensor delivers.
+#: Output of a sensor.
 Item = TypeVar("Item")
 
 
