@@ -145,7 +145,7 @@ class WallContact:
     Attributes:
         state: Result of the last tick.
         plane_ns: Capture time of the last accepted plane, -1 before the first.
-        surface_offset: Distance from the felt surface to the seen one [m], 0 while they are one.
+        surface_offset: Distance from the felt surface to the observed one [m], 0 while they are one.
     """
 
     def __init__(self, config: ControllerConfig) -> None:

@@ -37,7 +37,7 @@ ODD_PLANES, MOST_REOPENED, AGREED_PLANES = 10, 2, 150
 TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
 JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
-#: Age of a plane that never came [s], and distance of a wall that was never seen [m].
+#: Age of a plane that never came [s], and distance of a wall that was never measured [m].
 NEVER_S, FAR_AWAY = 1e6, 1e3
 #: Turns are compared over this time [s], and evaluated once the gyro's have this root sum of squares [rad]: five times
 #: the noise of a turn by two normals of 0.6 deg each over the threshold's distance from a right sign.
@@ -79,7 +79,7 @@ class WallDistance:
     Attributes:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
-        offset: Distance from the felt surface to the seen one [m], 0 while they are one.
+        offset: Distance from the felt surface to the observed one [m], 0 while they are one.
         anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
         measured: Distance of the tip by this plane alone [m].

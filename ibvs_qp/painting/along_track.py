@@ -215,7 +215,7 @@ class AlongTrack:
         return near or nearest(self._certain(lines), expected, self._config.gates.first_stop_m)
 
     def _certain(self, lines: list[PatternLine]) -> list[PatternLine]:
-        """Edges of the board that are seen well."""
+        """Edges of the board in clear view."""
         limit, board = self._config.gates.start_deviation_m, [line for line in lines if line.kind == "board"]
         return [line for line in board if line.weight > CERTAIN_WEIGHT and line.track.deviation < limit]
 

@@ -287,7 +287,7 @@ class CrossTrack:
         nodes: slice | None,
         variances: np.ndarray | None = None,
     ) -> PatternLine | None:
-        """Correct with an edge of a stroke, `half` from its middle and seen in direction `ahead` along u, 0 for either.
+        """Correct with an edge of a stroke, `half` from its middle, in direction `ahead` along u, 0 for either.
 
         `nodes` are the states that are the error of the map; where it has none, `variances` are those of its nodes.
         """

@@ -110,7 +110,7 @@ class Stroke:
         return self.begin - self.along.u, self.place - self.cross.v
 
     def nominal_place(self, number: int) -> float:
-        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the far edge once it is seen."""
+        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to a far edge in view."""
         config, far_edge = self.config, self.cross.far_edge
         rows = number if math.isnan(far_edge) else config.rows
         return stroke_place(number, rows, far_edge, config.edge_margin_m, config.pitch_m)

@@ -58,7 +58,7 @@ class Detection:
         plane: The surface, or None.
         refused: Why there is no surface, or None.
         candidates: Lines on or around the surface, best first.
-        guides: The surface's own top, bottom, left and right edge, None where none is seen.
+        guides: The surface's own top, bottom, left and right edge, None where none is in view.
         tracked: Whether the picture continued a sequence.
         time_ms: Wall-clock time of the detection [ms].
     """

@@ -120,7 +120,7 @@ class Assessment:
         if abs(flown[-1] - length) > LENGTH_M:
             return f"{flown[-1]:.3f} m long, {length:.3f} m asked"
         if abs(aside[-1]) > LENGTH_M:
-            return f"it ends {_mm(abs(aside[-1]))} beside its line"
+            return f"it ends {_mm(abs(aside[-1]))} from its line"
         stray = float(np.abs(aside - aside.mean()).max())
         return f"{_mm(stray)} from its mean line" if stray > PLACE_M else ""
 

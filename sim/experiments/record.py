@@ -40,7 +40,7 @@ def data_file(folder: Path, name: str) -> Path:
 def summary(
     name: str, experiments: Sequence[Experiment], table: pl.DataFrame, folder: Path, facts: dict[str, Any]
 ) -> dict[str, Any]:
-    """The JSON of the contract, with paired differences and verdicts beside the cells.
+    """The JSON of the contract, with paired differences and verdicts in addition to the cells.
 
     Args:
         name: Experiment, or "all".

@@ -26,7 +26,7 @@ CLEARANCE_S = 0.02
 NUMBERS = "t phase row outcome step_us iterations reach_margin".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
-#: Inputs of the controller's step that are logged, beside those of every line.
+#: Inputs of the controller's step that are logged, in addition to those of every line.
 CONTACT_INPUTS = tuple(f"contact.{name}" for name in ("known", "distance", "push", "ramp"))
 INPUTS = (*CONTACT_INPUTS, "contact_weight", "velocity_known", "velocity")
 _PRESSED = [PHASES.index(phase) for phase in ("paint", "retouch", "climb")]

@@ -53,7 +53,7 @@ def save_trace(file: Path, trace: Trace) -> None:
 
 
 def load_trace(file: Path) -> Trace:
-    """Read a flight back; arrays beside `FIGURE_INPUTS`, the canvas and the pictures are missing.
+    """Read a flight back; arrays other than `FIGURE_INPUTS`, the canvas and the pictures are missing.
 
     Raises:
         ConfigError: When the file is missing, damaged, or no trace.

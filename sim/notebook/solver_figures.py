@@ -18,7 +18,7 @@ from sim.notebook.solvers import NEVER, Result
 COLOURS = {
     "OSQP, workspace": BLUE, "shipped": "#c2410c", "active set": GREEN, "qpsolvers": "#8a8a8a", "yours": "#7b3fa0",
 }  # fmt: skip
-#: Thrust error that is small beside the noise of the thrusts [N].
+#: Thrust error that is small against the noise of the thrusts [N].
 SMALL_N = 1e-2
 #: Time between two ticks [us].
 TICK_US = 4000.0

@@ -31,7 +31,7 @@ _FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "
 _RECORD = ("log.npz", "summary.json")
 _README = """One run of ibvs-qp.
 
-report.html   all results on one page; open it in a browser (it plays video.mp4 beside it, and needs nothing else)
+report.html   all results on one page; open it in a browser (it plays video.mp4 of the folder, and needs nothing else)
 summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
 video.mp4     the vehicle from outside, camera view, phase and push (H.264)

@@ -53,7 +53,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
     Args:
         run: The run.
-        log: Folder of its log, if the run stores one; its trace goes beside it.
+        log: Folder of its log, if the run stores one; its trace goes next to it.
 
     Raises:
         KeyboardInterrupt: On Ctrl-C.

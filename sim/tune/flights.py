@@ -44,7 +44,7 @@ SLIPPERY, SATURATING_PUSH = 0.3, 1.03
 SLIDING = PressJob(hold_s=2.0, slide_s=4.0)
 #: Direction of the slide in B.
 LEFT = np.array([0.0, -1.0, 0.0])
-#: Starts, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+#: Starts, approaches and retreats in addition to the strokes [s]; sizes the progress bar only.
 _OVERHEAD_S = 9.0
 
 

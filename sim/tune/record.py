@@ -112,7 +112,7 @@ def _finalist(each: Finalist) -> dict[str, Any]:
 
 
 def _finalists(finalists: dict[str, Finalist]) -> list[str]:
-    """Table of the finalists beside the shipped preset."""
+    """Table of the finalists and the shipped preset."""
     if not finalists:
         return []
     objectives = [each.label for each in OBJECTIVES]

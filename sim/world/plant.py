@@ -46,7 +46,7 @@ class Plant(PlantReadings):
         landed: Whether it is over because the vehicle touched down.
         wind: The air; its mean may be changed in flight.
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
-        outer_force: Force at the true centre of mass beside that of the air, world NED [N], or None.
+        outer_force: Force at the true centre of mass in addition to that of the air, world NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
         pushes: Normal contact force at every physics step of the last tick [N], likewise.
         tick_ns: The control tick [ns].
@@ -152,7 +152,7 @@ class Plant(PlantReadings):
 
     @property
     def on_board(self) -> bool:
-        """Whether the tip lies inside the board's outline; beside it the wall takes the push."""
+        """Whether the tip lies inside the board's outline; outside it the wall takes the push."""
         return self._face.on_board
 
     @property

@@ -149,7 +149,7 @@ class BoxSearch:
         return np.floor((np.fmin(across, down) - 1.0) / self._step)
 
     def _side(self, places: np.ndarray, border: int) -> float:
-        """Where most rays of a side saw the boundary, or the picture's border if too few agree."""
+        """Where most rays of a side met the boundary, or the picture's border if too few agree."""
         if len(places) < _VOTES:
             return float(border)
         middle = float(np.median(places))

@@ -49,7 +49,7 @@ class PaperPerception:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything seen."""
+        """Clear the memory."""
         self._gate.reset()
         self._flow.reset()
         self._center: tuple[float, float] | None = None

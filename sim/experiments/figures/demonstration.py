@@ -20,7 +20,7 @@ from sim.flight.trace import Trace
 from sim.sweep.statistics import select
 from sim.world.board import BoardGeometry
 
-#: Colours of quantities beside the law's own: true values under estimates, and the second and third axis.
+#: Colours of quantities other than the law's own: true values under estimates, and the second and third axis.
 TRUE, SECOND, THIRD = "#f0a94b", "#333333", "#9a4f8f"
 #: The attitude is shown at least to this angle [deg]; greater ones widen the axis.
 LEAST_ANGLE_DEG = 1.0

@@ -60,7 +60,7 @@ def test_legs_of_an_own_strategy_are_compared_with_the_way_of_the_tip():
     trace.legs = (*legs, (0.0, -0.2))
     assert shortfall(trace) == "leg 4: not painted"
     trace.legs = ((-0.6, 0.0), (0.6, 0.02), (-0.6, 0.0))
-    assert shortfall(trace) == "leg 2: it ends 20 mm beside its line"
+    assert shortfall(trace) == "leg 2: it ends 20 mm from its line"
     trace.legs = legs
     u = along(trace)
     middle = (trace.row == 2) & (np.abs(u - np.median(u[trace.row == 2])) < 0.05)
