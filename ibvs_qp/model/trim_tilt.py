@@ -84,9 +84,9 @@ class TrimTilt:
         rows = ca.vertcat(ca.horzcat(*columns), ca.DM.eye(2))
         lower = ca.vertcat(level.lower - level.slope * push, -limit, -limit)
         upper = ca.vertcat(level.upper - level.slope * push, limit, limit)
-        target = self._sweep(rows, lower, upper, pressing)
+        goal = self._sweep(rows, lower, upper, pressing)
         part = 1.0 - ca.exp(-body.dt / TRIM_TIME_S)
-        signals.output("trim_tilt", signals.remember("trim_tilt", self.angles + part * (target - self.angles)))
+        signals.output("trim_tilt", signals.remember("trim_tilt", self.angles + part * (goal - self.angles)))
 
     def _sweep(self, rows: ca.SX, lower: ca.SX, upper: ca.SX, pressing: ca.SX) -> ca.SX:
         """Angles after one sweep over the multipliers of all rows [rad], (2,); 0, as those, while not pressing.
