@@ -99,7 +99,7 @@ def push_reach(
 
 
 def ray_reach(facets: WrenchFacets, wrench: np.ndarray, direction: np.ndarray, lower: Limit, upper: Limit) -> PushReach:
-    """Greatest push beside any steady wrench of the rotors; limits and Raises as of `push_reach`.
+    """Greatest push on top of any steady wrench of the rotors; limits and Raises as of `push_reach`.
 
     Args:
         facets: Of the rotors.

@@ -79,7 +79,7 @@ class WrenchFacets:
         return bool((low <= ON_PLANE).all() and (high >= -ON_PLANE).all())
 
     def interval(self, wrench: np.ndarray, direction: np.ndarray, lower: Limit, upper: Limit) -> tuple[float, float]:
-        r"""Least and greatest t with :math:`w + t\,d` attainable; (inf, -inf) when there is none.
+        r"""Least and greatest t with :math:`w + t\,d` attainable; (inf, -inf) if no t is.
 
         Args: as of `rooms`; direction d, (6,), of which t is a multiple.
         """

@@ -1,4 +1,4 @@
-"""A control law behind the checks of its inputs: what the program's and the analytic controller share."""
+"""A control law behind the checks of its inputs: common to the program's and the analytic controller."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
 from ibvs_qp.validation.reference import ReferenceGate
 
 #: Without a measured velocity the integral alone moves the vehicle: a slide falls short.
-NO_VELOCITY = "velocity: missing, the reference's velocity is hardly followed"
+NO_VELOCITY = "velocity: missing, tracking of the reference's velocity is degraded"
 
 
 class Inputs(NamedTuple):
@@ -31,7 +31,7 @@ class Inputs(NamedTuple):
     measurement: Measurement | None  # None if it was refused
     reference: Reference
     contact: ContactState | None
-    rejected: tuple[str, ...]  # what was refused, with the reason
+    rejected: tuple[str, ...]  # refused inputs, with the reason
 
 
 class CheckedLaw(ABC):
@@ -52,7 +52,7 @@ class CheckedLaw(ABC):
         self._camera = TurnedCamera(config.vehicle.camera_turn_deg)
 
     def reset(self) -> None:
-        """As after construction, to the bit."""
+        """Restore the state after construction, bit-identical."""
         self.setpoints.reset()
         self.gate.reset()
         self.references.reset()

@@ -1,7 +1,7 @@
 """HybridController: one quadratic program per tick for lines, push, level flight, yaw and six tilted rotors.
 
 A tick validates its inputs, evaluates the set-points of the tasks (one compiled function that also fills the program),
-solves the program with OSQP and reports what tasks and limits did. The equations are in `ibvs_qp.tasks` and
+solves the program with OSQP and reports the results of tasks and limits. The equations are in `ibvs_qp.tasks` and
 `ibvs_qp.limits`, one file each; the program is assembled in `ibvs_qp.qp.problem`.
 """
 
@@ -104,8 +104,8 @@ class HybridController(CheckedLaw):
         engine_kind: Their solution; a subclass may solve the same rows differently.
 
     Args:
-        config: Everything it needs; the default flies the Tarot T960.
-        tasks: Further tasks beside the shipped ones (docs/extending.md).
+        config: All settings; the default is for the Tarot T960.
+        tasks: Tasks in addition to the shipped ones (docs/extending.md).
         limits: Further limits.
 
     Raises:
@@ -126,7 +126,7 @@ class HybridController(CheckedLaw):
         self.reset()
 
     def reset(self) -> None:
-        """As after construction, to the bit."""
+        """Restore the state after construction, bit-identical."""
         super().reset()
         self.engine.reset()
         self._recovery = 0
@@ -179,13 +179,13 @@ class HybridController(CheckedLaw):
         self, measurement: Measurement, reference: Reference, solution: AcceptedSolution, rejected: tuple[str, ...]
     ) -> Command:
         thrusts, setpoints, data = solution.thrusts, self.setpoints, self.engine.data
-        unallocated, limits, given_up = np.zeros(6), (), 0.0
+        unallocated, limits, largest = np.zeros(6), (), 0.0
         if solution.limited:
             limits = active_limits(self.problem, solution.x, solution.y)
         if solution.limited or data.beyond_limits:
             unallocated = setpoints.effectiveness.dot(data.free - thrusts)
-            given_up = max(map(abs, unallocated.tolist()))
-        own = setpoints.note(thrusts, given_up)
+            largest = max(map(abs, unallocated.tolist()))
+        own = setpoints.note(thrusts, largest)
         return Command(
             stamp_ns=int(measurement.stamp_ns),
             thrusts=thrusts,

@@ -25,7 +25,7 @@ class _Reference:
 
 @dataclass(frozen=True, eq=False)
 class FlightState:
-    """Snapshot of a `Pilot`, an `Assured` or a controller; `restore` continues from it as often as wanted.
+    """Snapshot of a `Pilot`, an `Assured` or a controller; `restore` continues from it any number of times.
 
     Attributes:
         kind: Class that the snapshot is of.
@@ -43,7 +43,7 @@ def take_state(root: Any, config: Any) -> FlightState:
     """State of a pilot or controller with a configuration."""
     parts = _parts(root)
     references = {path: _Reference(path, _kind(part)) for path, part in parts.items()}
-    # What `deepcopy` finds in its memo is not copied: parts become references, settings stay as they are.
+    # Entries of its memo are not copied by `deepcopy`: parts become references, settings stay as they are.
     memo: dict[int, Any] = {id(part): references[path] for path, part in parts.items()}
     memo |= {id(settings): settings for settings in _settings(config)}
     values = copy.deepcopy({path: _state(part) for path, part in parts.items()}, memo)

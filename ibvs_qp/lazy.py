@@ -1,6 +1,6 @@
 """Public names that load on first use: a program that only checks its command line waits for no solver and no OpenCV.
 
-A module states its public names once, as imports in the stub beside it (``.pyi``), which type checkers read as well.
+A module states its public names once, as imports in the stub next to it (``.pyi``), which type checkers read as well.
 """
 
 from __future__ import annotations

@@ -70,6 +70,6 @@ def small_difference(first: Sequence[float], second: Sequence[float]) -> tuple[f
 
 
 def angle_between(first: Sequence[float], second: Sequence[float]) -> float:
-    """Angle between two attitudes [rad], whatever the signs of their quaternions."""
+    """Angle between two attitudes [rad], for any signs of their quaternions."""
     w, *vector = multiply(conjugate(first), second)
     return 2.0 * math.atan2(math.hypot(*vector), abs(w))

@@ -1,4 +1,4 @@
-"""Pictures of the job: path, weights, contact, and what estimation and vision make of a flight."""
+"""Pictures of the job: path, weights, contact, and results of estimation and vision in a flight."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ VISION_PX = 560
 
 
 def estimation() -> Figure:
-    """Closing speed of a flown touch: truth, estimate, and what differentiated depth would tell."""
+    """Closing speed of a flown touch: truth, estimate, and differentiated depth."""
     scene = dataclasses.replace(SCENE, start=dataclasses.replace(SCENE.start, distance_m=0.15))
     flown = fly(scene, FlightOptions(features="geometric"), job=PressJob(hold_s=1.0))
     time, speed = flown.t, flown.velocity[:, 0]

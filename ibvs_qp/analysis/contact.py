@@ -61,14 +61,14 @@ class ContactLoop:
         force_delay_s: float,
         vibration_m_s2: float = 0.0,
         gusts: bool = True,
-        believed: float = 1.0,
+        stiffness_ratio: float = 1.0,
     ) -> None:
         gains, vehicle, contact = config.gains, config.vehicle, config.contact
         self.stiffness, self.damping, self.force_delay = stiffness, damping, force_delay_s
         self.mass, self.lag, self.drag = vehicle.mass_kg, vehicle.motor_lag_s, vehicle.linear_drag_n_s_m
         self.tick, self.lead, self.command_filter = config.tick_s, gains.push_lead_s, gains.push_filter_s
         #: Stiffness of wall and brush in filter and law; their damping, and the age of the force, in the filter.
-        self.estimated = believed * stiffness
+        self.estimated = stiffness_ratio * stiffness
         self.filter_damping, self.filter_delay = config.brush.damping_n_s_m, config.brush.force_delay_s
         spring, self.damper = (gains.force_ksp, gains.force_ksd) if config.impedance else (0.0, 0.0)
         direct = gains.force_kfp * min(1.0, contact.full_gain_stiffness_n_m / self.estimated)
@@ -225,7 +225,11 @@ def contact_sensitivity(config: ControllerConfig, ratio: float = 1.0) -> float:
     brush = config.brush
     stiffnesses = np.geomspace(brush.stiffness_min_n_m, brush.stiffness_max_n_m, STIFFNESS_SAMPLES).tolist()
     wall = brush.damping_n_s_m, brush.force_delay_s
-    loops = [ContactLoop(config, k, *wall, gusts=g, believed=1.0 / ratio) for k in stiffnesses for g in (True, False)]
+    loops = [
+        ContactLoop(config, k, *wall, gusts=gusts, stiffness_ratio=1.0 / ratio)
+        for k in stiffnesses
+        for gusts in (True, False)
+    ]
     return max(loop.sensitivity for loop in loops)
 
 

@@ -57,7 +57,7 @@ class Bridge:
         config: Settings.
         flight: Configuration of the flight.
         clock: Clock of the stamps [ns]: that of ROS, to which PX4's stamps are synchronised.
-        pilot: Pilot to fly; None builds it. Its perception is loaded here, and prepared for the first picture.
+        pilot: Pilot to run; None builds it. Its perception is loaded here, and prepared for the first picture.
 
     Raises:
         ConfigError: When DDS cannot start, or a setting does not fit the vehicle.
@@ -96,7 +96,7 @@ class Bridge:
         )
 
     def tick(self, now_ns: int) -> bool:
-        """Read, decide, fly and send at a monotonic time [ns]; for `ibvs_qp.pilot.runner.run`."""
+        """Read, check the gate, step the pilot and send at a monotonic time [ns]; for `ibvs_qp.pilot.runner.run`."""
         self.inputs.poll(now_ns)
         config, before, clock_ns = self.config, self.gate.state, self._clock()
         ages = {role: self.inputs.age_s(role, clock_ns) for role in _INERTIAL}
@@ -139,7 +139,7 @@ class Bridge:
             self._writers[topic].write(value)
 
     def _missing(self, now_ns: int, lost: list[str]) -> list[str]:
-        """Reasons not to be ready, beside lost inputs: old sensors, wrong lens, faults in the axes."""
+        """Reasons not to be ready, in addition to lost inputs: old sensors, wrong lens, faults in the axes."""
         timeout, held = self.config.sensor_timeout_s, self.inputs.held
         found = [role for role in ("wrench", "color", "depth") if self.inputs.older(role, now_ns, timeout)]
         if not found and self.inputs.older(PAIR, now_ns, timeout):

@@ -22,7 +22,7 @@ class RotorCurve(Checked):
     thrust_max_n: float | None = setting(
         None, "thrust at full command; without it the vehicle's thrust_max_n", unit="N", low=0.1, high=1000.0
     )
-    quadratic: float = setting(0.0, "share of the quadratic part that PX4's THR_MDL_FAC leaves out", low=0.0, high=1.0)
+    quadratic: float = setting(0.0, "fraction of the quadratic term without PX4's THR_MDL_FAC", low=0.0, high=1.0)
 
     def of(self, vehicle: VehicleParams) -> ThrustCurve:
         """Curve of a vehicle's rotors.
@@ -41,7 +41,7 @@ class RotorCurve(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeConfig:
-    """What the bridge reads and writes, and when it stops."""
+    """Inputs and outputs of the bridge, and its stop conditions."""
 
     topics: Px4Topics = field(default_factory=Px4Topics)
     imu_type: str = choice(SENSOR_COMBINED, "type of the topic imu", (SENSOR_COMBINED, IMU))

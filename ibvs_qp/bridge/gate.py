@@ -1,4 +1,4 @@
-"""When the bridge may fly: waiting, checking, ready, flying, stopped."""
+"""States of the bridge: waiting, checking, ready, flying, stopped."""
 
 from __future__ import annotations
 

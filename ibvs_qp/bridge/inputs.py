@@ -8,12 +8,12 @@ from typing import Literal, NamedTuple
 
 from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.bridge.dds import PICTURE_DEPTH, SAMPLE_DEPTH, Participant
-from ibvs_qp.ros.held import HeldSamples
+from ibvs_qp.ros.latest_samples import LatestSamples
 from ibvs_qp.ros.messages import IMAGE, BadMessage, decoded, from_px4
 from ibvs_qp.ros.topics import ACCEPTED
 
 CONTROL_MODE = "px4_msgs/msg/VehicleControlMode"
-#: Roles beside those of `ibvs_qp.ros.topics.ACCEPTED`: PX4's mode, and a colour picture with its depth.
+#: Roles in addition to those of `ibvs_qp.ros.topics.ACCEPTED`: PX4's mode, and a colour picture with its depth.
 MODE, PAIR = "mode", "pair"
 #: Largest message, and picture without its pixels [bytes]: 1 kB, and names of frames.
 LARGEST_MESSAGE = 4096
@@ -88,7 +88,7 @@ class Inputs:
     def __init__(self, config: BridgeConfig, participant: Participant, clock: Callable[[], int]) -> None:
         self._readers = {each.role: (participant.reader(*each[1:]), each) for each in subscriptions(config)}
         self._attitude_in_imu = not config.topics.attitude
-        self.held = HeldSamples(config.topics, clock)
+        self.held = LatestSamples(config.topics, clock)
         self.mode: ControlMode | None = None
         self.arrived_ns: dict[str, int] = {}
 

@@ -71,7 +71,7 @@ class ControllerConfig(Checked):
     )
 
     def __post_init__(self) -> None:
-        """Derive what follows from the vehicle, and validate: it is fully actuated, and a push can begin."""
+        """Derive settings from the vehicle, and validate: it is fully actuated, and a push can begin."""
         super().__post_init__()
         object.__setattr__(self, "gains", derive(self.gains, scaled_gains(self.vehicle, self.gains_of)))
         object.__setattr__(self, "contact", derive(self.contact, contact_values(self.vehicle)))

@@ -1,6 +1,6 @@
 """Gains of both laws, their scaling to a vehicle, and weights of the program's tasks.
 
-``python -m sim.report.catalogue`` writes out the weights beside their tasks (docs/tasks_and_limits.md).
+``python -m sim.report.catalogue`` writes out the weights next to their tasks (docs/tasks_and_limits.md).
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def _gain(default: float, doc: str, *, unit: str = "", high: float) -> Any:
 
 
 def _lead(of: str, default: float) -> Any:
-    """Setting of a lead against the motors' lag; 0 is none."""
+    """Setting of a lead against the motors' lag; 0 switches it off."""
     return _gain(default, f"lead of the {of}: this far ahead by the modelled acceleration", unit="s", high=0.5)
 
 
 def _filter(rows: str, default: float) -> Any:
-    """Setting of a row filter; 0 is none."""
+    """Setting of a row filter; 0 switches it off."""
     return _gain(default, f"filter of the {rows} towards the last achieved command", unit="s", high=LONGEST_FILTER)
 
 

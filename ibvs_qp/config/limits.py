@@ -10,8 +10,8 @@ from ibvs_qp.config.field_of_view import field_of_view
 from ibvs_qp.config.settings import Checked, require_order, setting
 from ibvs_qp.config.vehicle import VehicleParams
 
-#: Yaw bound per yaw at which a propeller strikes the wall [-], and its range [deg]: at least what `yaw_deg` takes, at
-#: most where the errors of the lines are exact.
+#: Yaw bound per yaw at which a propeller strikes the wall [-], and its range [deg]: at least the lower end of
+#: `yaw_deg`, at most where the errors of the lines are exact.
 _OF_STRIKE, _LEAST_YAW_DEG, _MOST_YAW_DEG = 0.5, 0.5, 10.0
 #: Least room for a guide between two bounds of the view [-]: of a camera that looks past the wall, which is refused
 #: elsewhere.

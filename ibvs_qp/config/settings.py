@@ -44,7 +44,7 @@ def setting(
         low: Smallest allowed value, of each entry for tuples.
         high: Largest allowed value.
         why: Reason for the default.
-        words: Strings that are allowed beside numbers.
+        words: Strings that are allowed as well as numbers.
     """
     limits = {"low": low, "high": high, "words": words}
     return dataclasses.field(default=default, metadata={"doc": doc, "unit": unit, "why": why, **limits})
@@ -202,8 +202,8 @@ def _convert(hint: Any, value: Any, place: str) -> Any:
         if not isinstance(value, dict):
             raise ConfigError(f"{place} must be a table, got {shown(value)}")
         return {key: _convert(typing.get_args(hint)[1], entry, f"{place}.{key}") for key, entry in value.items()}
-    wanted = {float: (int, float), int: (int,), bool: (bool,), str: (str,), type(None): (type(None),)}.get(hint)
-    wrong = wanted is None or not isinstance(value, wanted) or (hint in (int, float) and isinstance(value, bool))
+    kinds = {float: (int, float), int: (int,), bool: (bool,), str: (str,), type(None): (type(None),)}.get(hint)
+    wrong = kinds is None or not isinstance(value, kinds) or (hint in (int, float) and isinstance(value, bool))
     if wrong or (hint is float and isinstance(value, int) and not _is_finite(value)):
         raise ConfigError(f"{place} = {shown(value)} is refused: a {getattr(hint, '__name__', hint)} is needed")
     return float(value) if hint is float else value

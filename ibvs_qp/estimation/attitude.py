@@ -1,4 +1,4 @@
-"""Attitude without steps that the gyro did not see; roll and pitch; angular velocity by gyro and motors."""
+"""Attitude without steps that the gyro did not measure; roll and pitch; angular velocity by gyro and motors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ UNFILTERED_HZ = 1000.0
 
 
 def continuous_attitude(signals: Signals, measured: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.SX:
-    """Attitude (w, x, y, z) without steps that the gyro did not see: absorbed at once, given back slowly.
+    """Attitude (w, x, y, z) without steps that the gyro did not measure: absorbed at once, given back slowly.
 
     An estimator that re-aligns itself moves its attitude by degrees in one tick. Taken at once, gravity leaks into
     the accelerations along the wall and the wall normal, 0.34 m/s^2 for 2 degrees, faster than any filter learns it.
@@ -98,7 +98,7 @@ def estimated_rate(
               \dot{\hat\Omega} = \hat\alpha + 2\pi f (\Omega - \hat\Omega)
 
     with the gyro Omega, the lagged thrusts :math:`\hat u`, the moments observed and fed forward at the step before, and
-    f = ``angular_rate.gyro_bandwidth_hz``. Above f the motors' model counts: the rotors do not see the gyro's noise,
+    f = ``angular_rate.gyro_bandwidth_hz``. Above f the motors' model counts: the rotors do not follow the gyro's noise,
     and a commanded rotation is not late, as it is behind a low-pass filter.
     """
     inertia = ca.sparsify(config.vehicle.inertia)

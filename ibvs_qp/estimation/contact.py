@@ -16,12 +16,12 @@ from ibvs_qp.estimation.wall_distance import NEVER_S, Plane, Tick, WallDistance
 from ibvs_qp.symbolic.logic import both, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 
-#: Without a plane for this long [s], a push means that the tip touches, whatever the drifting distance says.
+#: Without a plane for this long [s], a push means contact, at any value of the drifting distance.
 BLIND_S = 0.3
-#: A tip that shall press and is felt to push harder than this [N] touches, although the distance says otherwise: planes
-#: since its last start are those of another surface, such as a wall behind the board. Before a contact the tip must
-#: also move slower than this along the normal [m/s], for this long [s]: an approach is faster down to 15 mm from the
-#: wall, so that a false force makes no contact far from it.
+#: While a press is commanded, a measured push above this [N] means contact at any distance: the planes since the last
+#: start then belong to another surface, such as a wall behind the board. Before a contact the tip must also move slower
+#: than this along the normal [m/s], for this long [s]: an approach is faster down to 15 mm from the wall, so that a
+#: false force makes no contact far from it.
 FELT_PUSH, STOPPED_SPEED, STOPPED_S = 2.0, 0.02, 0.1
 #: The push noise is learned beyond this multiple of `contact_distance_m`.
 FREE_DISTANCES = 2.0

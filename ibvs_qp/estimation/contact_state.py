@@ -18,8 +18,8 @@ class ContactState(NamedTuple):
         acceleration: Filtered rate of `rate` [m/s^2].
         rate_noise: Standard deviation of `rate` [m/s].
         acceleration_noise: Standard deviation of one accelerometer sample along n [m/s^2].
-        bias: Part of the measured acceleration along n that is none [m/s^2]: accelerometer bias and gravity seen
-            through an attitude error.
+        bias: Error of the measured acceleration along n [m/s^2]: accelerometer bias, and gravity through an
+            attitude error.
         speed: Speed of the centre of mass into the wall [m/s]; the tip moves with the body's rotation as well.
         depth: Camera to wall along the normal [m], infinite while unknown.
         push: Filtered push [N].

@@ -148,7 +148,7 @@ class WallContact:
     Attributes:
         state: Result of the last tick.
         plane_ns: Capture time of the last accepted plane, -1 before the first.
-        surface_offset: Distance from the felt surface to the seen one [m], 0 while they are one.
+        surface_offset: Distance from the felt surface to the observed one [m], 0 while they are one.
     """
 
     def __init__(self, config: ControllerConfig) -> None:
@@ -174,7 +174,7 @@ class Estimator:
     Attributes:
         contact: Wall and contact.
         motion: Velocity, odometer and lines in the wall plane.
-        attitude: (w, x, y, z), without steps that the gyro did not see.
+        attitude: (w, x, y, z), without steps that the gyro did not measure.
         rate: Angular velocity [rad/s], (3,).
         force: Specific force [m/s^2], (3,).
         axes: Axes of the wall and gravity in B.
@@ -216,7 +216,7 @@ class Estimator:
 
     @property
     def lost(self) -> bool:
-        """Whether the attitude is too uncertain to fly by."""
+        """Whether the attitude is too uncertain for control."""
         return self._fallback.lost
 
     def doubt(self) -> None:

@@ -22,7 +22,7 @@ CALM_AIR = 0.1
 MOMENT_BANDWIDTH = 2.5
 #: The force observer averages evenly over this time at the start, then turns to its bandwidth [s].
 START_TIME = 0.25
-#: Largest believable external moment [N m]; beyond it is a fault, not a load.
+#: Largest plausible external moment [N m]; a larger one is a fault, not a load.
 MOMENT_BOUND = 6.0
 
 

@@ -16,7 +16,7 @@ AVERAGING_TIME = 0.5
 #: Push above which the ratio is meaningful [N]; sliding speed likewise [m/s], or this part of a slower command.
 LEAST_PUSH, LEAST_SPEED, SLOW_RATIO = 1.5, 0.02, 0.5
 
-#: A slide of this length has measured the friction [s]: 0.08 m at the acceleration of a stroke; what is left of the
+#: A slide of this length has measured the friction [s]: 0.08 m at the acceleration of a stroke; the weight of the
 #: first value is then 14 %, so that a reach at friction 0.8 is 5 % too large at most.
 MEASURED_AFTER = 1.0
 

@@ -1,4 +1,4 @@
-"""Attitude and rate while inertial sensors fail: the motors' model, corrected by what remains."""
+"""Attitude and rate while inertial sensors fail: the motors' model, corrected by the remaining sensors."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from ibvs_qp.symbolic.signals import Signals
 ANGLE, RATE, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)
 #: The chain of one axis.
 CHAIN = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
-#: Spectral densities: of the angle itself, of the rate by the motors' model [rad^2/s^3], and of what that model lacks
+#: Spectral densities: of the angle itself, of the rate by the motors' model [rad^2/s^3], and of the error of that model
 #: [rad^2/s^5].
 NOISE = (1e-10, 0.05**2, 0.03**2)
 #: Standard deviations at the failure: attitude [rad], rate [rad/s], unmodelled acceleration [rad/s^2].
 START_STD = (2e-3, 0.01, 0.3)
-#: Standard deviations of what remains: attitude and plane or line of a picture [rad], gyro [rad/s].
+#: Standard deviations of the remaining sensors: attitude and plane or line of a picture [rad], gyro [rad/s].
 ATTITUDE_STD, PICTURE_STD, GYRO_STD = 2e-3, 8e-3, 5e-3
 #: Refused beyond this many standard deviations.
 GATE_SIGMAS = 6.0
-#: The attitude is lost when its standard deviation exceeds this [rad]: farther from level than a descent bears.
+#: The attitude is lost when its standard deviation exceeds this [rad], the largest error that a descent tolerates.
 LOST_STD = math.radians(20.0)
 #: Inputs of a correction: time since the last one [s]; age of the measurement [s] and state then; which of angles and
 #: rates it measures, their values and the deviation of the angles; a line of a picture, whether there is one, the angle
@@ -112,7 +112,7 @@ class InertialFallback:
 
     @property
     def lost(self) -> bool:
-        """Whether the attitude is too uncertain to fly by."""
+        """Whether the attitude is too uncertain for control."""
         if not self.active:
             return False
         dt = (self._stamp - self._corrected) * 1e-9

@@ -64,7 +64,7 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
-    """Wall and contact as estimated, by the names and units of `ContactState`; what is true is 1.
+    """Wall and contact as estimated, by the names and units of `ContactState`; true is 1.
 
     Attributes:
         moment_noise: Its `across_noise` [N].

@@ -18,12 +18,12 @@ SLOTS, LINES = 8, 6
 
 
 class LineRecord(NamedTuple):
-    """What is remembered of a line."""
+    """Memory of a line."""
 
     variance: ca.SX  # noise of the offset (`WhiteNoise`) [m^2]
     samples: ca.SX
     residual: ca.SX
-    angle: ca.SX  # filtered [rad]; the angle hardly changes
+    angle: ca.SX  # filtered [rad]; the angle changes little
     spread: ca.SX  # its variance [rad^2]
     angle_variance: ca.SX  # noise of the angle [rad^2]
     angle_samples: ca.SX

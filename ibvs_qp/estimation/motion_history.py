@@ -21,13 +21,13 @@ from ibvs_qp.symbolic.logic import Number, both, where, wrapped
 from ibvs_qp.symbolic.signals import Signals
 
 #: Least length of a full bin [s]: four ticks at 250 Hz, a tenth of a rotor's or the brush's time constants. All bins
-#: but the newest are full: 0.304 s at least, whatever the ticks, which covers the oldest line that counts (0.3 s).
+#: but the newest are full: 0.304 s at least at any tick, which covers the oldest line that counts (0.3 s).
 BIN_S, BINS = 0.016, 20
 #: Rounding of the sum of a bin's ticks [s], far below a tick.
 _ROUNDING_S = 1e-6
 #: Smallest duration of a bin in a division [s].
 _LEAST_S = 1e-9
-#: What is later than this counts as late [s]: half a tick at 250 Hz.
+#: A sample later than this counts as late [s]: half a tick at 250 Hz.
 LATE_S = 0.002
 #: Least distance from camera to wall [m], and least part of a line's ray across the optical axis [-], in divisions.
 LEAST_DISTANCE, LEAST_RAY = 0.01, 1e-6
@@ -160,7 +160,7 @@ def carried_wall(plane: ca.SX, motion: Motion, camera: ca.DM) -> Wall:
 
 
 def carried_line(rho: ca.SX, theta: ca.SX, wall: Wall, motion: Motion, camera: ca.DM) -> tuple[ca.SX, ca.SX]:
-    """Line (rho, theta) at the present; as it was when seen from within the wall, or edge-on."""
+    """Line (rho, theta) at the present; unchanged for a camera inside the wall, or edge-on."""
     turn, shift = in_camera(motion, camera)
     ray = turn @ ca.vertcat(ca.cos(theta), ca.sin(theta), -rho)
     ray = ray + ca.dot(ray, shift) / ca.fmax(wall.distance, LEAST_DISTANCE) * wall.normal

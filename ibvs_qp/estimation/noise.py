@@ -1,4 +1,4 @@
-"""Noise estimated from successive samples, whatever the source claims."""
+"""Noise estimated from successive samples, independent of the stated one."""
 
 from __future__ import annotations
 

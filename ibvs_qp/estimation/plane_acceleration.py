@@ -21,7 +21,7 @@ CONTACT_CHANGE = 30.0
 #: Changes of the unexplained acceleration below this bandwidth [rad/s] are gusts.
 GUST_HIGH = 8.0
 #: A change of this many times the power of noise and calm air is a gust at once: noise alone has it once in 8000 ticks.
-LEAP_POWERS = 9.0
+JUMP_POWERS = 9.0
 #: Power of the changes of an accelerometer without any noise [m^2/s^4].
 LEAST_POWER = 1e-12
 
@@ -66,7 +66,7 @@ def plane_force(
             stuck tip is drawn, friction rises with the thrust, and a later sample of it is a false acceleration.
         normal: Unit vector into the wall, in B, (3,).
         use_model: Whether the tip presses, and the camera corrects the velocity. Otherwise the accelerometer alone
-            counts: a vehicle that flies blind drifts by the difference of its bias to that of the model.
+            counts: without planes the velocity drifts by the difference of its bias to that of the model.
     """
     known = ca.sumsqr(motors) > 0.0
     late = signals.state("plane.contact", 3)
@@ -88,8 +88,8 @@ def plane_force(
         noise = density * GUST_HIGH / 2.0 + LEAST_POWER
         gust = gust_weight(signals, "plane.change", dt, changed, noise, config.calm_change)
         least = config.calm_change**2 + noise
-        leap = ca.fmax(changed - LEAP_POWERS * least, 0.0)
-        gust = ca.fmax(gust, leap / (leap + least))
+        jump = ca.fmax(changed - JUMP_POWERS * least, 0.0)
+        gust = ca.fmax(gust, jump / (jump + least))
     calm = explained + slow
     return PlaneForce(where(both(known, use_model), calm + gust * (measured - calm), measured), density)
 

@@ -17,7 +17,7 @@ MOST_SIGMAS = 5.0
 #: After a hole of this time, and of so many ticks, the filter begins anew [s], [-]: a contact of 10 kN/m swings a
 #: twelfth of its period within it.
 HOLE_S, HOLE_TICKS = 0.012, 1.5
-#: Largest believable disturbing force [N], acceleration by bias and a wrong attitude [m/s^2], which is that of six
+#: Largest plausible disturbing force [N], acceleration by bias and a wrong attitude [m/s^2], which is that of six
 #: degrees, and rate of the penetration [m/s].
 FORCE_BOUND, SLOW_BOUND, RATE_BOUND = 40.0, 1.0, 0.5
 #: Time for which a stiffness that was not measured errs in the same direction [s].
@@ -63,8 +63,8 @@ class PushDisturbance:
     .. math::
         \dot p = k v, \quad m \dot v = F_u + m g_n + d + e - f, \quad \dot d = w_d, \quad \dot e = w_e
 
-    The force sensor measures f a delay ago; accelerometer minus thrusts measures d - f. So d is what the accelerometer
-    measures too, wind and wrong thrusts, and e what it does not: its own bias, and weight through a wrong attitude.
+    The force sensor measures f a delay ago; accelerometer minus thrusts measures d - f. So d contains wind
+    and wrong thrusts, which the accelerometer also measures; e contains its bias, and weight through a wrong attitude.
     The noise of d follows the gusts, so that calm air is filtered more; k is the estimated stiffness. Until it is
     measured, p has the noise of k v and the force sample counts as of now: with 10 kN/m assumed on a brush of 1.5 kN/m
     the filter otherwise explains the push by a disturbing force, and in vibration the vehicle bounces. While the tip is

@@ -91,9 +91,9 @@ def missing_thrust(
     .. math:: r = M (f_{spec}, \dot\Omega) + \Omega \times J \Omega - B \hat u - F_c,
 
     first-order low-passed (the moment by its momentum, without differentiating the gyro), in thrusts: :math:`-B^+ r`.
-    What lasts for seconds, as a wrong mass, thrust coefficients and wind, is subtracted. The output "missing_noise"
+    Errors that last for seconds, such as mass, thrust coefficients and wind, are subtracted. The output "missing_noise"
     is the standard deviation of one entry while the rotors follow, "motor_thrusts" are the lagged thrusts behind the
-    same low-pass filter: minus the missing thrust they are what the rotors give.
+    same low-pass filter: minus the missing thrust they are the actual thrusts.
 
     Args:
         signals: Registry.

@@ -29,8 +29,8 @@ MEAN = 1.0
 NOISE_SIGMAS = 3.0
 #: The stiffness is measured once the compliance is known to this part.
 KNOWN_PART = 0.5
-#: The result is on the stiff side by so many standard deviations [-]: a loop that believes in less than a third of the
-#: true stiffness is unstable.
+#: The result is on the stiff side by so many standard deviations [-]: with an estimate below a third of the true
+#: stiffness the loop is unstable.
 STIFF_SIDE = 0.5
 #: The push rises by this much since the touch before a plane counts [N].
 LEAST_RISE = 0.5

@@ -16,7 +16,7 @@ class TrackedLine:
         slot: Its place among the lines in the filter's state.
         angle: Angle of the normal in (right, down) [rad]; pi/2 for a level line.
         deviation: Standard deviation of the filtered offset [m], from the noise that the frames show.
-        seen_ns: Capture time of the last frame that shows it; news_ns: tick at which that frame arrived.
+        seen_ns: Capture time of the last frame that shows it; fresh_ns: tick at which that frame arrived.
         frames: Number of frames that showed it.
         offset: Signed distance from the tip to the line along its normal [m]; normals point down (horizontal lines)
             or right (vertical lines), so > 0 is below or right of the tip.
@@ -34,7 +34,7 @@ class TrackedLine:
     angle: float
     deviation: float
     seen_ns: int
-    news_ns: int = 0
+    fresh_ns: int = 0
     frames: int = 1
     offset: float = 0.0
     weight: float = 0.0

@@ -14,7 +14,7 @@ from ibvs_qp.config.settings import stated
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
 from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
 
-#: What is refused: it lies beside or behind a camera that looks along +x.
+#: Reason of a refusal: the object lies beside or behind a camera that looks along +x.
 OUT_OF_VIEW = "not in front of a camera that looks along +x"
 
 Plane = tuple[float, float, float, float]
@@ -50,14 +50,14 @@ class TurnedCamera:
         self.straight = not any(turn_deg)
 
     def features(self, frame: FeatureFrame, rejected: list[str]) -> FeatureFrame:
-        """Result of perception in C; names what cannot be seen from there."""
+        """Result of perception in C; rejects parts out of view there by name."""
         if self.straight:
             return frame
         lines, plane = self._lines(frame.lines, rejected), self._plane(frame.plane, rejected)
         return dataclasses.replace(frame, lines=lines, plane=plane)
 
     def measurement(self, measurement: Measurement, rejected: list[str]) -> Measurement:
-        """A measurement with its lines and its plane in C; names what cannot be seen from there."""
+        """A measurement with its lines and its plane in C; rejects parts out of view there by name."""
         if self.straight:
             return measurement
         lines, plane = self._lines(measurement.lines, rejected), self._plane(measurement.plane, rejected)

@@ -37,9 +37,9 @@ ODD_PLANES, MOST_REOPENED, AGREED_PLANES = 10, 2, 150
 TOUCH_STD = 0.003
 #: Standard deviation of a speed from two planes a few frames apart [m/s], and least time between them [s].
 JUMP_SPEED_STD, SHORTEST_JUMPS = 0.05, 0.05
-#: Age of a plane that never came [s], and distance of a wall that was never seen [m].
+#: Age of a plane that never came [s], and distance of a wall that was never measured [m].
 NEVER_S, FAR_AWAY = 1e6, 1e3
-#: Turns are compared over this time [s], and judged once the gyro's have this root sum of squares [rad]: five times
+#: Turns are compared over this time [s], and evaluated once the gyro's have this root sum of squares [rad]: five times
 #: the noise of a turn by two normals of 0.6 deg each over the threshold's distance from a right sign.
 TURN_S, LEAST_TURN = 0.25, math.radians(3.0)
 #: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 mirrored.
@@ -79,7 +79,7 @@ class WallDistance:
     Attributes:
         normal: Unit vector into the wall, in B, (3,).
         known: Whether a plane was measured since the start.
-        offset: Distance from the felt surface to the seen one [m], 0 while they are one.
+        offset: Distance from the felt surface to the observed one [m], 0 while they are one.
         anew: Whether the distance has started from a plane since the last contact: that plane may be another surface's.
         accepted: Whether this tick's plane was accepted.
         measured: Distance of the tip by this plane alone [m].
@@ -227,7 +227,7 @@ class WallDistance:
         variance = where(within, deviation**2, settings.outlier_std_m**2)
         innovation = ca.vertcat(distance, -self.lever_speed) - past[:2]
         at_capture = kalman.correct(either(within, counts_little), DISTANCE, innovation[DISTANCE], variance)
-        # The tip stands: so does the body, but for its rotation.
+        # The tip stands: so does the body, except for its rotation.
         slip, speed_variance = innovation[SPEED] - at_capture[SPEED], settings.stationary_speed_std_m_s**2
         stands = both(within, tip_stationary, kalman.within(SPEED, slip, speed_variance, settings.gate_sigmas))
         change = at_capture + kalman.correct(stands, SPEED, slip, speed_variance)
@@ -240,7 +240,7 @@ class WallDistance:
         return accepted, restart
 
     def touch(self, happens: ca.SX, another: ca.SX) -> None:
-        """The tip rests at the wall, whatever the drifting distance says; the accelerometer's bias stays.
+        """Put the tip at the wall, at any value of the drifting distance; the accelerometer's bias stays.
 
         Args:
             happens: Whether it rests there.
@@ -326,16 +326,16 @@ def mirrored_normal(signals: Signals, new: ca.SX, since_last: ca.SX, normal: ca.
     due = both(new, started, time >= TURN_S)
     felt, turned = wrapped(yaw - begun), wrapped(seen - first)
     square, product = square + where(due, felt * felt, 0.0), product + where(due, felt * turned, 0.0)
-    judged = both(due, square >= LEAST_TURN**2)
-    found = either(found, both(judged, product < OPPOSED * square))
+    evaluated = both(due, square >= LEAST_TURN**2)
+    found = either(found, both(evaluated, product < OPPOSED * square))
     begins = both(new, either(no(started), due))
     kept = {
         "started": either(started, new),
         "time": where(begins, 0.0, where(new, time, signals.state("turns.time"))),
         "seen": where(begins, seen, first),
         "yaw": where(begins, yaw, begun),
-        "square": where(judged, 0.0, square),
-        "product": where(judged, 0.0, product),
+        "square": where(evaluated, 0.0, square),
+        "product": where(evaluated, 0.0, product),
         "found": found,
     }
     for name, value in kept.items():

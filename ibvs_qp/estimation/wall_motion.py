@@ -243,7 +243,7 @@ class WallMotion:
         start, end = self._config.fade_start_s, self._config.fade_end_s
         for line in tuple(self.lines.values()):
             line.offset, line.weight = self.state[LINES + line.slot], line.fresh_weight
-            age = (stamp_ns - line.news_ns) * 1e-9
+            age = (stamp_ns - line.fresh_ns) * 1e-9
             if age > end:
                 del self.lines[line.track_id]
             elif age > start:
@@ -376,7 +376,7 @@ class WallMotion:
         track.residual, track.seen_angle = found.residual, found.seen_angle
         seen = line.segment is not None and found.length >= 0.0
         track.middle, track.length = (found.middle, found.length) if seen else (math.nan, 0.0)
-        track.seen_ns, track.news_ns, self.lines_ns = stamp_ns, self._stamp, max(self.lines_ns, stamp_ns)
+        track.seen_ns, track.fresh_ns, self.lines_ns = stamp_ns, self._stamp, max(self.lines_ns, stamp_ns)
         track.fresh_weight = min(1.0, track.frames / self._config.frames_to_trust) * line.weight
         track.surface_side, track.kind = int(found.sign) * line.surface_side, line.kind or track.kind
 

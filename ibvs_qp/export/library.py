@@ -13,7 +13,7 @@ from ibvs_qp.export.tables import write_layout, write_tables
 from ibvs_qp.export.tick_code import TickCode
 from ibvs_qp.qp.program_code import write_program
 
-#: The shell: what does not depend on the configuration.
+#: The shell: code that is independent of the configuration.
 SHELL = Path(__file__).parent / "c"
 #: Entries of a wrench: with more rotors some changes of the thrusts leave it as it is.
 WRENCH = 6

@@ -1,4 +1,4 @@
-"""Recorded ticks as C tables: what the self-test and the benchmark of the library replay."""
+"""Recorded ticks as C tables: for the self-test and the benchmark of the library."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "RECOVERY_TICKS": config.solver.recovery_ticks,
         "RESTART_STAMPS": clock.RESTART_STAMPS,
     }
-    times = {name: getattr(clock, name) for name in ("STAMP_END", "LEAP_NS", "RESTART_NS", "LEAD_NS")}
+    times = {name: getattr(clock, name) for name in ("STAMP_END", "JUMP_NS", "RESTART_NS", "LEAD_NS")}
     times["OLDEST_LINE_NS"] = OLDEST_LINE_NS
     constants = {
         "TICK_S": config.tick_s,

@@ -32,7 +32,7 @@ OUTPUTS = (
 )
 #: Numbers with a point or an exponent, which C takes for doubles.
 _DOUBLE = re.compile(r"(?<![\w.])((?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])")
-#: CasADi calls these for doubles, whatever its type of numbers; the library's own names choose the precision.
+#: CasADi calls these for doubles, even in single precision; the library's own names choose the precision.
 _FUNCTIONS = re.compile(r"\b(?:casadi_)?(sin|cos|tan|asin|acos|atan|atan2|exp|log|sqrt|fabs|fmin|fmax|floor)\(")
 #: Every argument and result is there; a number is no condition.
 _CHECKS = (
@@ -45,9 +45,9 @@ _CHECKS = (
 
 
 class TickCode:
-    """The tick's function, with the law's terms for the analytic fallback beside the program.
+    """The tick's function, with the law's terms for the analytic fallback next to the program.
 
-    What only reports and supervision read is left out, with the states that nothing else needs: a third of the code.
+    Outputs for reports and supervision are left out, with the states that only they need: a third of the code.
 
     Attributes:
         signals: Inputs, states and outputs of the tick.
@@ -86,7 +86,7 @@ def analytic_terms(model: Model) -> list[ca.SX]:
     """Terms of `ibvs_qp.analytic`: rows of the lines, commanded image accelerations, secondary acceleration.
 
     Returns:
-        Rows one after the other, (6 (slots + 1),): the row of every line, then the angle of the line nearest the image
+        Rows in sequence, (6 (slots + 1),): the row of every line, then the angle of the line nearest the image
         centre; rows of absent lines are zero. Commands, (slots + 1,). Acceleration for their null space, (6,).
     """
     twist = model.camera_twist

@@ -55,7 +55,7 @@ def contact_feedforward(
 
     .. math:: M = \hat M + \frac{T s}{T s + 1}\, p \times F,
 
-    with p the tip. Without it a sticking tip turns the vehicle by a degree before the moment is measured, and leaps
+    with p the tip. Without it a sticking tip turns the vehicle by a degree before the moment is measured, and jumps
     when it breaks away.
 
     ``travel`` is the commanded velocity in the wall plane, in B [m/s], (3,), ``friction`` the coefficient.

@@ -57,7 +57,7 @@ def attitude(
         signals: Registry of the filter of roll and pitch.
         body: Attitude and angular velocity.
         contact: Normal of the wall.
-        target: Roll and pitch to fly.
+        target: Commanded roll and pitch.
         rate_ahead: Angular velocity after the lead [rad/s], (3,).
         bandwidth_hz: Of the attitude estimate in roll and pitch [Hz] (`filtered_roll_pitch`).
         trim_tilt: Roll and pitch taken by a push above 85 % of the level reach [rad], (2,) (`ibvs_qp.model.trim_tilt`).

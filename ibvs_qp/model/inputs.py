@@ -27,7 +27,7 @@ class Target:
         standoff: Tip to wall out of contact [m].
         velocity_right, velocity_down: In the wall plane [m/s].
         press: 1 to press the wall.
-        roll, pitch: Attitude [rad]; zero but for a vehicle that lost a rotor.
+        roll, pitch: Attitude [rad]; zero unless the vehicle has lost a rotor.
         travel_right, travel_down: Velocity planned at this push [m/s].
         trim_roll, trim_pitch: Attitude of a level hover with a limited rotor [rad].
     """
@@ -101,7 +101,7 @@ RUN_TIME = {
 
 
 def equations(config: ControllerConfig) -> ControllerConfig:
-    """What determines the equations: a configuration with the defaults of all that are inputs of the tick."""
+    """The configuration that determines the equations: inputs of the tick have their defaults."""
     switches = [name for name in RUN_TIME["limits"] if name.endswith("_barrier")]
     limits = LimitSettings(**{name: getattr(config.limits, name) for name in (*STRUCTURAL, *switches)})
     return replace(config, gains=Gains(), weights=Weights(), limits=limits, solver=SolverSettings())

@@ -33,9 +33,9 @@ from ibvs_qp.symbolic.signals import Signals
 
 T = TypeVar("T")
 
-#: Force or moment given up in the last step above which integrals stop [N, N m].
+#: Unallocated force or moment of the last step above which integrals stop [N, N m].
 WINDUP_WRENCH = 0.5
-#: A row filter of less than this is none [s]: it keeps the exponent finite.
+#: A row filter below this is off [s]: the exponent stays finite.
 LEAST_FILTER = 1e-5
 
 
@@ -99,7 +99,7 @@ class Model:
         self.travel = self.wall.in_body(target.velocity_right, target.velocity_down)
         self.tip_stationary = ca.logic_and(self.contact.touching, ca.norm_2(velocity) <= SLIDING_COMMAND)
         self.view = camera_view(vehicle, self.body, self.contact, self.travel)
-        self.integrate = signals.input("given_up") < WINDUP_WRENCH
+        self.integrate = signals.input("unallocated") < WINDUP_WRENCH
         self.integrate_in_plane = ca.logic_and(ca.logic_not(self._stuck()), self.integrate)
 
         static_wrench, friction = self._disturbances()
@@ -119,7 +119,7 @@ class Model:
         self._name_outputs()
 
     def of(self, config: ControllerConfig) -> Model:
-        """A copy for a configuration with the same equations; what is declared in the copy stays in it."""
+        """A copy for a configuration with the same equations; declarations in the copy stay in it."""
         other = copy.copy(self)
         other.config, other.signals, other.parameters = config, self.signals.copy(), list(self.parameters)
         other._cache = dict(self._cache)

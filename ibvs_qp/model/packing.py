@@ -16,7 +16,7 @@ _ZERO = (0.0, 0.0, 0.0)
 _NOT_GIVEN = (0.0, 1.0) + (0.0,) * (sum(GIVEN.values()) - 2)
 #: Plane before the first one: in front of the camera, for the equations.
 _NO_PLANE = (0.0, 0.0, 1.0, -1.0)
-#: What `StepInputs` keeps from tick to tick.
+#: Attributes that `StepInputs` keeps from tick to tick.
 KEPT = ("_pairing", "_lines", "_paired", "_plane", "_plane_age")
 #: Places in the entries of a line.
 _PRESENT, _VERTICAL, _CHANGED = LINE.index("present"), LINE.index("vertical"), LINE.index("changed")

@@ -1,4 +1,4 @@
-"""What the rotors' limits allow: thrust window of a step, largest and least push, and the push reference."""
+"""Reach within the rotors' limits: thrust window of a step, largest and least push, and the push reference."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def push_planes(
 
 
 def push_range(planes: PushPlanes) -> tuple[ca.SX, ca.SX]:
-    """Least and largest push between the planes [N]; the least is `NO_PUSH` where there is none."""
+    """Least and largest push between the planes [N]; the least is `NO_PUSH` without one."""
     slope, lower, upper = planes.slope, planes.lower, planes.upper
     along, safe = ca.fabs(slope) > RELATIVE_ZERO, ca.if_else(ca.fabs(slope) > RELATIVE_ZERO, slope, 1.0)
     room = ca.if_else(along, ca.if_else(slope > 0.0, upper, lower) / safe, UNBOUNDED)

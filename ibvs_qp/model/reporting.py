@@ -16,7 +16,7 @@ from ibvs_qp.model.setpoints import Setpoints
 
 #: A thrust this far outside its window counts as clipped [N].
 CLIPPED = 1e-9
-#: Largest magnitude of what a caller's contact holds, in any of its units, and error of its normal's length.
+#: Largest magnitude of a number in a caller's contact, in any unit, and error of its normal's length.
 CONTACT_BOUND, UNIT_TOLERANCE = 1e6, 1e-3
 #: Place of the depth behind normal, known and distance.
 DEPTH = ContactState._fields.index("depth") - 3
@@ -27,7 +27,7 @@ REDUCED = 1e-3
 
 
 def check_contact(contact: Any) -> tuple[ContactState | None, tuple[str, ...]]:
-    """The contact of a caller if its numbers are sound; otherwise None, and the rejection of what is none."""
+    """The contact of a caller if its numbers are valid; otherwise None, and the reasons of the rejection."""
     if contact is None:
         return None, ()
     if not issubclass(type(contact), ContactState):
@@ -78,7 +78,7 @@ def reach_note(setpoints: Setpoints, reference: Reference) -> tuple[str, ...]:
     low = least - commanded >= REDUCED
     other = least if low else setpoints.push_reference
     places = 3 if round(commanded, 1) == round(other, 1) else 1
-    result = "asked, below what the rotors can hold: least" if low else "reduced to"
+    result = "asked, below the least push of the rotors," if low else "reduced to"
     end = "," if low else ", the rotors' reach"
     return (f"reference.push_force: {commanded:.{places}f} N {result} {other:.{places}f} N{end} {how}",)
 

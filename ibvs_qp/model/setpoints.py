@@ -76,7 +76,7 @@ class Setpoints:
         last: Last commanded thrusts [N], (n,), None before the first.
     """
 
-    STATE = ("config", "_contact", "_stamp", "last", "_change", "_given_up")
+    STATE = ("config", "_contact", "_stamp", "last", "_change", "_unallocated")
 
     def __init__(self, model: Model, extra: Sequence[ca.SX] = ()) -> None:
         config = self.config = model.config
@@ -134,7 +134,7 @@ class Setpoints:
 
     @contextlib.contextmanager
     def without_trace(self) -> Iterator[None]:
-        """What is evaluated inside leaves no trace: states, outputs, pairs of lines and time are as before."""
+        """Evaluate without a trace: states, outputs, pairs of lines and time are as before."""
         memory, own = self.step.memory.copy(), vars(self._inputs)
         inputs, others = {name: own[name] for name in KEPT}, (self._stamp, self._contact)
         own.update(copy.deepcopy(inputs))
@@ -153,7 +153,7 @@ class Setpoints:
         self._inputs.reset()
         self._stamp = -1
         self.last: np.ndarray | None = None
-        self._change, self._given_up = np.zeros(len(self.floor)), 0.0
+        self._change, self._unallocated = np.zeros(len(self.floor)), 0.0
         self.normal[:], self.right[:], self.down[:] = np.eye(3)
         self.step.outputs["reach"][0], self.step.outputs["least_push"][0] = UNBOUNDED, 0.0
 
@@ -185,14 +185,14 @@ class Setpoints:
         started = self.last is not None
         values["thrust_last"][:] = self.last if started else hold_thrusts(self.config, measurement)
         values["thrust_change"][:], values["commanded"][0] = self._change, started
-        values["given_up"][0] = self._given_up
+        values["unallocated"][0] = self._unallocated
         values["thrust_step"][0] = self._rate_step if started else ANY_STEP
         lowest = self.floor if low is None else np.maximum(low, self.floor)
         values["thrust_low"][:] = lowest
         values["thrust_high"][:] = self.ceiling if high is None else np.maximum(np.minimum(high, self.ceiling), lowest)
 
-    def note(self, thrusts: np.ndarray, given_up: float) -> np.ndarray:
-        """Store the commanded thrusts, and the largest force or moment given up (anti-windup), for the next step.
+    def note(self, thrusts: np.ndarray, unallocated: float) -> np.ndarray:
+        """Store the commanded thrusts, and the largest unallocated force or moment (anti-windup), for the next step.
 
         Returns:
             The stored copy, read-only: the caller of the controller may write into the command's own array.
@@ -201,12 +201,12 @@ class Setpoints:
         own.setflags(write=False)  # it is in the reports of the command, too
         if self.last is not None:
             self._change = own - self.last
-        self.last, self._given_up = own, given_up
+        self.last, self._unallocated = own, unallocated
         return own
 
     @property
     def contact(self) -> ContactState:
-        """Wall and contact at this step: the caller's, or the estimate, which is read when it is wanted."""
+        """Wall and contact at this step: the caller's, or the estimate, which is read on first use."""
         if self._contact is None:
             self._contact = read_contact(self.step.results[: self._estimate].tolist())
         return self._contact

@@ -32,7 +32,7 @@ class TrimTilt:
     In level axes the rotors must make the force :math:`F = f d - m g e_z` and the moment :math:`f p \times d` of the
     push f along :math:`d = n + \mu t`. In a body tilted by :math:`\theta = (\varphi, \vartheta)` they change by
     :math:`F \times \theta` and :math:`f p \times (d \times \theta)`, so the planes :math:`(y_F, y_M)` of the attainable
-    wrench set (`ibvs_qp.model.reach`) see the change :math:`C \theta`:
+    wrench set (`ibvs_qp.model.reach`) change by :math:`C \theta`:
 
     .. math::
         \min_{\theta, s}\; \tfrac12 P\,\theta^T\theta + \tfrac12 s^T s \quad\text{s.t.}\quad
@@ -42,7 +42,7 @@ class TrimTilt:
     method), solves this program of two variables; the angles follow with `TRIM_TIME_S`.
 
     Attributes:
-        angles: Roll and pitch to fly in this tick [rad], (2,); zero without permission.
+        angles: Commanded roll and pitch of this tick [rad], (2,); zero without permission.
     """
 
     def __init__(self, signals: Signals, config: ControllerConfig) -> None:
@@ -84,9 +84,9 @@ class TrimTilt:
         rows = ca.vertcat(ca.horzcat(*columns), ca.DM.eye(2))
         lower = ca.vertcat(level.lower - level.slope * push, -limit, -limit)
         upper = ca.vertcat(level.upper - level.slope * push, limit, limit)
-        wanted = self._sweep(rows, lower, upper, pressing)
+        goal = self._sweep(rows, lower, upper, pressing)
         part = 1.0 - ca.exp(-body.dt / TRIM_TIME_S)
-        signals.output("trim_tilt", signals.remember("trim_tilt", self.angles + part * (wanted - self.angles)))
+        signals.output("trim_tilt", signals.remember("trim_tilt", self.angles + part * (goal - self.angles)))
 
     def _sweep(self, rows: ca.SX, lower: ca.SX, upper: ca.SX, pressing: ca.SX) -> ca.SX:
         """Angles after one sweep over the multipliers of all rows [rad], (2,); 0, as those, while not pressing.

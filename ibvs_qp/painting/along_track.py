@@ -1,7 +1,7 @@
 r"""Place of the tip along the strokes, from the odometer and the edges of the board across them.
 
 u counts from the beginning of the nominal stroke: the edge to which stroke 1 runs lies at u = stroke + margin. A Kalman
-filter holds u and n, the u of the edge beside the beginning. The place of these edges beside the tip is
+filter holds u and n, the u of the edge next to the beginning. The place of these edges beside the tip is
 :math:`p = (\text{stroke} + \text{margin}) - u` and :math:`p = n - u`.
 """
 
@@ -22,12 +22,12 @@ from ibvs_qp.painting.pattern_lines import (
     surface_edges,
 )
 
-#: Variance of the odometer per metre of way [m^2/m]: 7 mm after 1 m, as flown in the datasheet world.
+#: Variance of the odometer per metre of way [m^2/m]: 7 mm after 1 m, as measured in the datasheet world.
 DRIFT_PER_M = 5e-5
 #: Standard deviation of an edge's place in one look, and of an unknown place [m]; of the scale by which a far edge's
 #: place is seen [-]: depth and focal length.
 EDGE_STD, UNKNOWN_STD, SCALE_STD = 2e-3, 0.5, 0.015
-#: Standard deviation of the margin beside the beginning where the board's edge confirms it [m].
+#: Standard deviation of the margin next to the beginning where the board's edge confirms it [m].
 MARGIN_STD = 1e-3
 #: An edge farther from its expected place than this shows another length of the board, or an error of the odometer [-].
 SIGMAS = 3.0
@@ -148,7 +148,7 @@ class AlongTrack:
         return True
 
     def find_mark(self, lines: Sequence[PatternLine]) -> bool:
-        """Take u from the edge beside the beginning, if the job begins at the margin from it and the tip is there."""
+        """Take u from the edge next to the beginning, if the job begins at the margin from it and the tip is there."""
         near, mark_m = -self._config.edge_margin_m, self._config.gates.mark_m
         mark = nearest(surface_edges(lines, parallel=False), near)
         if mark is None or mark.weight <= CERTAIN_WEIGHT or not self._config.begins_at_margin:
@@ -168,7 +168,7 @@ class AlongTrack:
     # ------------------------------------------------------------------- looks
 
     def look(self, lines: Sequence[PatternLine]) -> str:
-        """Correct with the edges in view, once per look; returns what was noticed, or an empty text."""
+        """Correct with the edges in view, once per look; returns the event in words, or an empty text."""
         u, variance, noticed, self._unknown = self.u, self._variance, "", 0.0
         ends = [line for line in _ends(lines) if line.weight > (LOST_WEIGHT if self.end_seen else CERTAIN_WEIGHT)]
         # The length of stroke 1 is nominal.
@@ -186,7 +186,7 @@ class AlongTrack:
         return noticed or erred
 
     def _near_edge(self, lines: list[PatternLine]) -> tuple[PatternLine | None, str]:
-        """Correct with the edge beside the beginning; returns it and what was noticed."""
+        """Correct with the edge next to the beginning; returns it and the event in words."""
         if self._near_known:
             expected = self._near_u - self.u
             near = self._edge(lines, expected, self._config.gates.stop_m)
@@ -206,7 +206,7 @@ class AlongTrack:
         return near, ""
 
     def _edge(self, lines: list[PatternLine], expected: float, gate: float) -> PatternLine | None:
-        """Edge beside its expected place; else a certain edge of the board farther off.
+        """Edge near its expected place; else a certain edge of the board farther off.
 
         It is the odometer that errs, and no stroke runs over an edge in view: a fault of the velocity for seconds moves
         u by more than the margin.
@@ -215,7 +215,7 @@ class AlongTrack:
         return near or nearest(self._certain(lines), expected, self._config.gates.first_stop_m)
 
     def _certain(self, lines: list[PatternLine]) -> list[PatternLine]:
-        """Edges of the board that are seen well."""
+        """Edges of the board in clear view."""
         limit, board = self._config.gates.start_deviation_m, [line for line in lines if line.kind == "board"]
         return [line for line in board if line.weight > CERTAIN_WEIGHT and line.track.deviation < limit]
 
@@ -227,7 +227,7 @@ class AlongTrack:
                 return ""  # it leaves the picture or has just come, and its fit may be wrong
             unknown = self._config.gates.first_stop_m**2
             if row is _END and not self.end_seen:
-                # Both edges are seen, so the board is longer or shorter than the job says: the origin of u moves.
+                # Both edges are in view, so the board's length differs from the job's: the origin of u moves.
                 self._p += unknown
                 self._began_variance += unknown
                 self._unknown += unknown
@@ -235,7 +235,7 @@ class AlongTrack:
                 self._length_unsure = True
                 noticed = f"the board's edge lies {difference * 1e3:+.0f} mm from where the job expects it"
             elif row is _NEAR and self._length_unsure:
-                self._p[1, 1] += unknown  # it was the odometer then, and the board is as long as the job says
+                self._p[1, 1] += unknown  # the odometer has drifted, and the board has the length of the job
             else:
                 self._add_variance(unknown)
                 self._unknown += unknown

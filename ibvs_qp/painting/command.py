@@ -58,7 +58,7 @@ class PaintingCommand:
         guides: Lines to follow, each with its target offset [m]; where one leads, the velocity is its feed-forward.
         push: Push [N].
         tilt: Roll and pitch [rad], (2,).
-        trim: Roll and pitch of a vehicle with a limited rotor, flown like level [rad], (2,).
+        trim: Roll and pitch of a vehicle with a limited rotor, otherwise controlled as level [rad], (2,).
         travel: Velocity along the wall that is planned at this push (right, down) [m/s], (2,).
     """
 

@@ -17,7 +17,7 @@ class LineGates:
     )
     mark_m: float = setting(
         0.045,
-        "board edge beside the beginning: nearer to its place, it marks it",
+        "board edge next to the beginning: nearer to its place, it marks it",
         unit="m",
         why="a start placed by hand within 2 cm, turned by 3 deg at 0.45 m",
         low=0.005,
@@ -99,7 +99,7 @@ class PaintingConfig:
         2.0, "then both tolerances open with the square of time", unit="s", low=0.5, high=300.0
     )
     align_opening_max: float = setting(
-        5.0, "largest factor on both", why="15 mm and 25 mm/s: what 3 N rms of gusts leave", low=1.0, high=20.0
+        5.0, "largest factor on both", why="15 mm and 25 mm/s: errors with gusts of 3 N rms", low=1.0, high=20.0
     )
     press_time_s: float = setting(
         1.2, "least time in contact before a stroke", unit="s", why="the force ramp takes 1 s", low=0.0, high=10.0
@@ -117,13 +117,23 @@ class PaintingConfig:
         2.0, "time without a guide before the vehicle steps back for a wider view", unit="s", low=0.0, high=60.0
     )
     wide_view_m: float = setting(
-        1.2, "tip to wall where it stops stepping back", unit="m", why="sees 0.5 m around the tip", low=0.1, high=5.0
+        1.2,
+        "tip to wall where it stops stepping back",
+        unit="m",
+        why="0.5 m around the tip are in view",
+        low=0.1,
+        high=5.0,
     )
     survey_speed_m_s: float = setting(
         0.15, "speed of a move along the wall in free flight", unit="m/s", low=0.01, high=1.0
     )
     search_standoff_m: float = setting(
-        0.15, "tip to wall while a lost edge is searched", unit="m", why="sees what the brush hides", low=0.02, high=1.0
+        0.15,
+        "tip to wall while a lost edge is searched",
+        unit="m",
+        why="the brush hides less from there",
+        low=0.02,
+        high=1.0,
     )
     search_back_m: float = setting(0.15, "way back along the last stroke for that search", unit="m", low=0.0, high=1.0)
     least_certainty_m: float = setting(
@@ -148,13 +158,13 @@ class PaintingConfig:
     fresh_edge_timeout_s: float = setting(
         2.0, "longest search for the fresh edge after a climb", unit="s", low=0.0, high=20.0
     )
-    descend_s: float = setting(5.0, "retreat and descent after the wall was given up", unit="s", low=0.5, high=60.0)
+    descend_s: float = setting(5.0, "retreat and descent after the wall was abandoned", unit="s", low=0.5, high=60.0)
     descend_speed_m_s: float = setting(
         0.15, "speed of that descent", unit="m/s", why="slow: nothing measures the height", low=0.01, high=1.0
     )
     timeout_s: float = setting(
         15.0,
-        "longest start, approach, align, press, climb or retreat, beside the time of its way",
+        "longest start, approach, align, press, climb or retreat, added to the time of its way",
         unit="s",
         low=1.0,
         high=300.0,

@@ -3,8 +3,8 @@ r"""Kalman filter of the place of the tip across the strokes: states, odometer a
 The states: v of the true tip; :math:`\delta`, by which the picture shows the tip at a larger v (camera mount, arm,
 attitude); the odometer's drift; the direction of the strokes against the odometer's axes, and how these and the picture
 wander with the attitude; :math:`\beta`, by which an edge ahead seems to lie at a larger v than the same edge behind; v
-of the board's far edge; and, at `NODES` places along the last stroke and the one being laid, the amount by which each
-lies at a larger v than its map says.
+of the board's far edge; and, at `NODES` places along the last stroke and the one being laid, the amount by which the v
+of each exceeds that of its map.
 
 A map gets the error that v has when it is laid, so a node takes the error of v until the tip has passed it. Drift and
 direction change slowly: they keep a long chain of strokes straight, each of which follows the edge of the one before.
@@ -101,11 +101,11 @@ class CrossFilter:
             p[V, V] += dv**2
 
     def variance(self, row: np.ndarray) -> float:
-        """Variance of what a row of H expects."""
+        """Variance of the prediction of a row of H."""
         return float(row @ (self.p @ row))
 
     def correct(self, difference: float, row: np.ndarray, variance: float) -> None:
-        """Correct by a difference from what a row of H expects; its variance includes that of the noise."""
+        """Correct by a difference from the prediction of a row of H; its variance includes that of the noise."""
         gain = self.p @ row / variance
         self.x += gain * difference
         self.p -= np.outer(gain, row @ self.p)

@@ -224,7 +224,7 @@ class CrossTrack:
         return u, overlap + offset, deviation, largest + offset
 
     def _shares(self, u: float) -> np.ndarray:
-        """Shares of the nodes in the error of a map at a place along it, by linear interpolation, (NODES,)."""
+        """Weights of the nodes in the error of a map at a place along it, by linear interpolation, (NODES,)."""
         place = min(max(u / self._spacing, 0.0), NODES - 1.0)
         node, shares = min(int(place), NODES - 2), np.zeros(NODES)
         shares[node], shares[node + 1] = 1.0 - (place - node), 1.0 - (node + 1 - place)
@@ -287,7 +287,7 @@ class CrossTrack:
         nodes: slice | None,
         variances: np.ndarray | None = None,
     ) -> PatternLine | None:
-        """Correct with an edge of a stroke, `half` from its middle and seen in direction `ahead` along u, 0 for either.
+        """Correct with an edge of a stroke, `half` from its middle, in direction `ahead` along u, 0 for either.
 
         `nodes` are the states that are the error of the map; where it has none, `variances` are those of its nodes.
         """

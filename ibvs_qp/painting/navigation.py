@@ -100,7 +100,7 @@ class Navigation:
         return [track for track, v in self.cross.guides.items() if abs(v - place) < reach]
 
     def _marks(self, phase: str, stroke: Stroke) -> list[int]:
-        """Tracks of the edge beside the place to which the tip moves; another one may leave the picture on the way."""
+        """Tracks of the edge next to the place to which the tip moves; another one may leave the picture on the way."""
         if phase == "survey":
             return []
         to_end = (stroke.travel > 0.0) == (phase in ("paint", "retouch"))

@@ -1,8 +1,8 @@
 """The painting strategy: start, survey, approach, align, press; paint, retouch and climb stroke by stroke; retreat.
 
-Everything is in pattern coordinates (u along the strokes, v across; `ibvs_qp.painting.pattern`). Where the tip is and
-what leads it: `navigation`; targets and claims of a stroke: `stroke`. A "climb" is the step from stroke to stroke, in
-whatever direction.
+Everything is in pattern coordinates (u along the strokes, v across; `ibvs_qp.painting.pattern`). Place and guidance
+of the tip: `navigation`; targets and claims of a stroke: `stroke`. A "climb" is the step from stroke to stroke, in
+any direction.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ PRESS_REFERENCE_MIN = 1.0
 #: A touch this far from the beginning of its stroke is taken back [m], at most so often [-], while the edge that shows
 #: it is in view: the vehicle sways by 10 mm in hover, and a stroke may err by 10 mm in all.
 TOUCH_ASIDE_M, MOST_TOUCHES = 0.006, 2
-#: Least mean speed towards the wall, by which an approach and a touch are given their time [m/s]; a touch flies at
+#: Least mean speed towards the wall, which sets the time of an approach and of a touch [m/s]; a touch is flown at
 #: 12 mm/s, against errors of the force that no sensor shows.
 APPROACH_SPEED, TOUCH_SPEED = 0.05, 6e-3
 #: Last part of a stroke, over which the edge at its end leads [m], against gusts; over more, stiff line rows and the
@@ -50,11 +50,11 @@ class Painter(Strategy):
         self._stroke = Stroke(self.config, tip.cross, tip.along, number=1, place=self.config.edge_margin_m)
         self._alignment, self._stroke_end = Alignment(self.config), StrokeEnd(self.config)
         self._last_time = self._standoff = math.nan
-        self._way_s = 0.0  # time of the way in this phase, beside the time-out [s]
+        self._way_s = 0.0  # time of the way in this phase, added to the time-out [s]
         self._since = math.inf  # time of the touch in press, and of the arrival in climb and search [s]
         self._speed = 0.0
         self._waypoints: list[tuple[float, float]] = []
-        self._uncertain = ""  # why the job is not what was asked, although it was flown to its end
+        self._uncertain = ""  # why the job differs from the specified one, although it was flown to its end
         self._paused = self._follows_end = False
 
     def step(self, inputs: PainterInput) -> PaintingCommand:
@@ -109,7 +109,7 @@ class Painter(Strategy):
         self._enter(inputs, "retreat", reason)
 
     def _waits_for(self, inputs: PainterInput) -> str:
-        """What the phase waits for, with value and limit."""
+        """Condition for which the phase waits, with value and limit."""
         config, phase, (u, v) = self.config, self.phase, self._stroke.way
         if phase == "start":
             needed = (("wall", inputs.wall_known), ("tare of the force sensor", inputs.tared))
@@ -159,7 +159,7 @@ class Painter(Strategy):
             self._enter(inputs, "approach", f"{found}, stroke 1 begins at the margin")
         else:
             along.start_here()
-            self._enter(inputs, "survey", f"{found}, stroke 1 begins where the edge at its end says")
+            self._enter(inputs, "survey", f"{found}, stroke 1 begins by the edge at its end")
 
     def _survey(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         """Fly along stroke 1 until the edge at its end is in view."""

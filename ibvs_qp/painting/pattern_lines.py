@@ -46,7 +46,7 @@ class PatternLine:
 
     @property
     def kind(self) -> str:
-        """What it borders: "board", "paint" or ""."""
+        """Object that it borders: "board", "paint" or ""."""
         return self.track.kind
 
     def target(self, error: float) -> float:

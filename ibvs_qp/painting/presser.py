@@ -14,7 +14,7 @@ from ibvs_qp.painting.speed import ramped
 class Presser(Painter):
     """Approaches and aligns like the painter, presses for a time, slides along the edge for a time, and retreats.
 
-    The hold begins with the touch, whatever push is reached.
+    The hold begins with the touch, at any push.
 
     Args:
         config: The paint job; its push, margins, speed and acceleration are used.
@@ -40,7 +40,7 @@ class Presser(Painter):
 
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good; a press that studies this case ends as planned, so it is no failure."""
-        self._give_up(inputs, reason)
+        self._leave_for_good(inputs, reason)
 
     def _time_out(self, inputs: PainterInput) -> None:
         if self.phase != "press" or math.isinf(self._touched):

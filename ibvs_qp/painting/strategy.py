@@ -26,9 +26,9 @@ LARGEST_OFFSET, LARGEST_ROW = 20.0, 1000
 
 
 class Strategy(ABC):
-    """What the tip does: a subclass implements `step`, everything else works as it is.
+    """Plan for the tip: a subclass implements `step`; defaults exist for everything else.
 
-    The pilot calls `fly`: it returns what `step` returns. A `step` that raises, or returns something unusable, is named
+    The pilot calls `fly`: it returns the result of `step`. A `step` that raises or returns an invalid command is named
     in `Command.rejected`, and the vehicle leaves the wall; so it does when the supervisor ends the job. A subclass with
     state of its own initialises it in `reset`, which first calls ``super().reset()``.
 
@@ -41,7 +41,7 @@ class Strategy(ABC):
         finished: Whether the strategy has ended.
         failed: Whether it ended without reaching its aim.
         reason: Why it ended or failed.
-        fault: What was wrong with `step`; empty without a fault.
+        fault: Fault of `step`; empty without one.
         legs: Way of the tip (right, down) in each leg that it paints [m]; leg k is painted in phase ``paint`` while
             `row` is k. The simulator compares them with the truth; empty where they are not known.
 
@@ -59,7 +59,7 @@ class Strategy(ABC):
         """As after construction."""
         self.phase, self.entered, self.row = PHASES[0], 0.0, 0
         self.log: list[tuple[float, str, str]] = []
-        self.finished = self.failed = self._leaving = self._given_up = False
+        self.finished = self.failed = self._leaving = self._abandoned = False
         self.reason = self.fault = ""
 
     @abstractmethod
@@ -103,7 +103,7 @@ class Strategy(ABC):
         """Targets of one tick: those of `step`, or those of the way off the wall; never raises."""
         if self.finished:
             return self._away()
-        if self._given_up:
+        if self._abandoned:
             return self._descend(inputs)
         if self._leaving:
             return self._retire(inputs)
@@ -121,7 +121,7 @@ class Strategy(ABC):
     @property
     def descending(self) -> bool:
         """Whether it has left the wall for good."""
-        return self._given_up
+        return self._abandoned
 
     def abandon(self, inputs: PainterInput, reason: str) -> None:
         """Leave the wall for good: detach, retreat and descend."""
@@ -130,14 +130,14 @@ class Strategy(ABC):
     def stop(self, inputs: PainterInput, reason: str) -> None:
         """The same at the supervisor's command: the aim is not reached."""
         self.failed = True
-        self._give_up(inputs, reason)
+        self._leave_for_good(inputs, reason)
 
     def expected_edge(self) -> ExpectedEdge | None:
         """A painted edge that should come into view, for perception; None for no such edge."""
         return None
 
-    def _give_up(self, inputs: PainterInput, reason: str) -> None:
-        self.reason, self._given_up = reason, True
+    def _leave_for_good(self, inputs: PainterInput, reason: str) -> None:
+        self.reason, self._abandoned = reason, True
         self.enter(inputs, "retreat", reason)
 
     def _end(self, inputs: PainterInput, reason: str, failed: bool = False) -> None:
@@ -156,10 +156,10 @@ class Strategy(ABC):
         return self._away()
 
     def _descend(self, inputs: PainterInput) -> PaintingCommand:
-        """Retreat of a vehicle that has given up the wall."""
+        """Retreat of a vehicle that has abandoned the wall."""
         config = self.config
         if inputs.time_s - self.entered > config.descend_s:
-            self._end(inputs, f"{self.reason}: wall given up, descended for {config.descend_s:g} s")
+            self._end(inputs, f"{self.reason}: wall abandoned, descended for {config.descend_s:g} s")
         velocity = np.array([0.0, config.descend_speed_m_s])
         return PaintingCommand(contact=False, standoff=config.retreat_m, velocity=velocity, guides=[], push=0.0)
 
@@ -168,7 +168,7 @@ class Strategy(ABC):
         return PaintingCommand(contact=False, standoff=self.config.retreat_m, push=self.config.push_n)
 
     def _state_fault(self) -> str:
-        """What is wrong with phase and row, which others read; empty if they are as documented."""
+        """Fault of phase and row, which others read; empty if they are as documented."""
         if self.phase not in PHASES:
             return f"strategy.phase: {self.phase!r:.40}, not one of {', '.join(PHASES)}"
         if type(self.row) is not int or not 0 <= self.row <= LARGEST_ROW:
@@ -178,10 +178,10 @@ class Strategy(ABC):
 
 
 def require_strategy(strategy: object) -> Strategy:
-    """The strategy, if it can fly.
+    """The strategy, if the pilot can run it.
 
     Raises:
-        ConfigError: When it is none, or was constructed without its base class.
+        ConfigError: When it is no `Strategy`, or was constructed without its base class.
     """
     if not isinstance(strategy, Strategy):
         raise ConfigError(f"strategy: {type_name(strategy)} is no instance of ibvs_qp.Strategy")
@@ -200,7 +200,7 @@ def _is_leg(leg: object) -> bool:
 
 
 def _checked(command: object, inputs: PainterInput) -> tuple[PaintingCommand | None, str]:
-    """A command with plain numbers within bounds, and what is wrong with it."""
+    """A command with plain numbers within bounds, and its fault."""
     if type(command) is not PaintingCommand:
         return None, f"strategy: step returned {type_name(command)}, not a PaintingCommand"
     rejected: list[str] = []

@@ -1,4 +1,4 @@
-"""The stroke in progress: where it belongs, what was painted of it, and whether it is claimed."""
+"""The stroke in progress: its place, its painted part, and whether it is claimed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ibvs_qp.painting.pattern import FILL, FILL_REST_M, PLACE_TOLERANCE_M, Patte
 from ibvs_qp.painting.speed import clipped
 
 #: The end of a stroke moves by at most this much so that its length is right [m]. A stroke that begins farther from its
-#: place than the other value shows that the board is not as long as the job says [m].
+#: place than the other value shows that the board's length differs from the job's [m].
 MOST_END_SHIFT_M, MOST_BEGIN_ERROR_M = 0.004, 0.015
 #: A stroke is as long as asked within this [m]; if it ends without an edge, u must be known this well [m].
 LENGTH_TOLERANCE_M, CERTAIN_LENGTH_M = 0.01, 0.005
@@ -111,7 +111,7 @@ class Stroke:
         return self.begin - self.along.u, self.place - self.cross.v
 
     def nominal_place(self, number: int) -> float:
-        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to the far edge once it is seen."""
+        """Nominal v of a stroke [m]; the last one of a filling job keeps the margin to a far edge in view."""
         config, far_edge = self.config, self.cross.far_edge
         rows = number if math.isnan(far_edge) else config.rows
         return stroke_place(number, rows, far_edge, config.edge_margin_m, config.pitch_m)
@@ -126,7 +126,7 @@ class Stroke:
 
     @property
     def certain_m(self) -> float:
-        """Half the overlap, or what is certain at any overlap [m]; a stroke that errs by twice as much leaves a gap."""
+        """Half the overlap, or the certainty at any overlap [m]; a stroke that errs by twice as much leaves a gap."""
         return max(0.5 * self.config.overlap_m, self.config.least_certainty_m)
 
     @property

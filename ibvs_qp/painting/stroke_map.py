@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-#: Length of a bin [m], and what lies before and behind the nominal stroke [m].
+#: Length of a bin [m], and length before and behind the nominal stroke [m].
 BIN_M, BEYOND_M = 0.01, 0.3
 #: Part of a window's bins that must be painted for its mean [-].
 LEAST_PAINTED = 0.5
@@ -127,7 +127,7 @@ class Strokes:
         farthest_out.add(u, v + margin)
 
     def end_pass(self, before: np.ndarray, after: np.ndarray) -> None:
-        """A pass ends; what it laid has moved along u, as of `AlongTrack.smoothed` [m], (n,) each.
+        """A pass ends; its paint has moved along u, as of `AlongTrack.smoothed` [m], (n,) each.
 
         Strokes have waves of 3 mm over 0.1 m: a map that is 20 mm off shows no gap where there is one.
         """

@@ -33,7 +33,7 @@ class CameraInput:
     """Pictures or features of one flight.
 
     Attributes:
-        perception_result: What perception found in the last picture, or None.
+        perception_result: Result of perception for the last picture, or None.
         picture: That picture, registered and rectified, or None.
         plane, plane_ns: Wall in the camera frame (nx, ny, nz, d) of the last features with one, and their stamp.
         image_ns: Stamp of the last features, -1 for never.
@@ -116,7 +116,7 @@ class CameraInput:
             velocity: Of the tip in B [m/s], (3,), or None.
             hints: Lines that are expected in the picture.
             is_new_picture: Whether a content differs from the last one.
-            rejected: Gets what is refused.
+            rejected: Receives the refusals.
         """
         if frame.image is None:
             features = frame.features
@@ -173,7 +173,7 @@ class CameraInput:
 
 
 def _content(frame: SensorFrame, features: FeatureFrame) -> object:
-    """What differs from picture to picture: sparse pixels, or the features themselves."""
+    """Content that differs from picture to picture: sparse pixels, or the features themselves."""
     if frame.image is not None:
         return frame.image.rgb[_SPARSE].tobytes(), frame.image.depth[_SPARSE].tobytes()
     return tuple(features.plane or ()), tuple([(line.rho, line.theta) for line in features.lines])

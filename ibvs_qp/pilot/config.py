@@ -22,7 +22,7 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 
-#: Distance of a guide from the view barrier at which the barrier hardly acts [m]; range of the result [m].
+#: Distance of a guide from the view barrier at which the barrier has little effect [m]; range of the result [m].
 _BARRIER_ROOM_M, _LEAST_REACH_M, _MOST_REACH_M = 0.015, 0.02, 2.0
 
 _IMAGE = channels(SensorFrame)["image"]
@@ -30,7 +30,7 @@ _IMAGE = channels(SensorFrame)["image"]
 
 @dataclass(frozen=True, kw_only=True)
 class CameraConfig(RgbdCameraSettings):
-    """Settings of the camera beside the colour intrinsics, which come with every picture."""
+    """Settings of the camera except the colour intrinsics, which come with every picture."""
 
     latest_s: float = setting(
         _IMAGE.oldest_s, "pictures older than this at delivery are refused", unit="s", low=0.01, high=2.0
@@ -59,7 +59,7 @@ class PilotConfig:
     law: str = choice("qp", "control law", LAWS)
 
     def __post_init__(self) -> None:
-        """Validate; derive what follows from law and brush."""
+        """Validate; derive settings from law and brush."""
         validate(self)
         if self.controller.gains_of != self.law:
             object.__setattr__(self, "controller", dataclasses.replace(self.controller, gains_of=self.law))
@@ -74,7 +74,7 @@ class PilotConfig:
         limits, most = self.controller.limits, self.safety.tilt_deg
         if math.sqrt(2.0) * (limits.trim_deg + limits.tilt_deg) > most and limits.trim_deg > 0.0:
             room = math.floor(100.0 * max(most / math.sqrt(2.0) - limits.tilt_deg, 0.0)) / 100.0
-            allowed = f"allowed is 0 to {room:g} deg beside tilt_deg, for safety.tilt_deg = {most:g} deg"
+            allowed = f"allowed is 0 to {room:g} deg with tilt_deg, for safety.tilt_deg = {most:g} deg"
             raise out_of_range("controller.limits.trim_deg", limits.trim_deg, "deg", allowed)
 
     @classmethod
@@ -85,7 +85,7 @@ class PilotConfig:
         return config
 
     def to_toml(self, *, derived: bool = False) -> str:
-        """Write the preset as TOML text; with ``derived`` also what follows from the rest, for a record."""
+        """Write the preset as TOML text; with ``derived`` also the derived settings, for a record."""
         return dump_toml(self, derived=derived)
 
 

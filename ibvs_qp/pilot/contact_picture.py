@@ -1,4 +1,4 @@
-"""The straightened picture while the tip presses: what of the wall the vehicle leaves in view, and where guides lie."""
+"""The straightened picture while the tip presses: the part of the wall in view, and the places of guides."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Estimation:
         frozen: bool,
         press: bool,
     ) -> tuple[ContactState, str]:
-        """Estimates of the tick; and in words that the tip has touched a wall before the seen one, if it has.
+        """Estimates of the tick; and an event text if the tip has touched a wall before the observed one.
 
         Args:
             frame: Sensors, `in_body`.
@@ -88,7 +88,7 @@ class Estimation:
         )
         if self.contact.surface_offset <= offset:
             return contact, ""
-        found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the seen surface"
+        found = f"{contact.push:.1f} N felt {1e3 * self.contact.surface_offset:.0f} mm before the observed surface"
         return contact, f"{found}: its distance starts anew there"
 
     def _missing(self, frame: SensorFrame) -> set[str]:

@@ -1,4 +1,4 @@
-"""The configured perception, loaded before the flight or beside it: at first it is translated, which takes seconds."""
+"""The configured perception, loaded before the flight or during it: the first translation takes seconds."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _SIZE, _FOCAL, _DISTANCE = (480, 640), 600.0, 0.5
 
 
 class PerceptionLoader:
-    """Loads perception in a thread of its own; what it loads does not depend on when.
+    """Loads perception in a thread of its own; the result does not depend on the time.
 
     Attributes:
         perception: The perception, None until it is loaded.
-        problem: Why there is none, "" while nothing loads.
+        problem: Why loading failed, "" without a failure.
     """
 
     STATE = ()
@@ -39,7 +39,7 @@ class PerceptionLoader:
         self._thread: threading.Thread | None = None
 
     def reset(self) -> None:
-        """As before the first picture; what is loaded stays."""
+        """As before the first picture; the loaded perception stays."""
         if self.perception is not None:
             self.perception.reset()
 

@@ -58,12 +58,12 @@ class Controller(Protocol):
 
 
 class LawCall(NamedTuple):
-    """What the law was given in a tick, and its command."""
+    """Inputs of the law in a tick, and its command."""
 
     measurement: Measurement | None  # None before the first
     reference: Reference
     contact: ContactState | None  # None in a tick without a frame
-    fixed: np.ndarray | None  # the supervisor's thrusts, which replace the law's [N], (n,); None while the law flies
+    fixed: np.ndarray | None  # the supervisor's thrusts in place of the law's [N], (n,); None while the law has control
     command: Command
 
 
@@ -117,7 +117,8 @@ class Pilot:
         The first time it is translated into machine code, which takes seconds. Features need no perception.
 
         Args:
-            picture: One of the camera to fly with: tables of its size and intrinsics are made, too. It is not kept.
+            picture: Picture of the camera of the flight: tables of its size and intrinsics are made, too. It is not
+                kept.
 
         Raises:
             RuntimeError: When perception cannot be loaded.
@@ -130,7 +131,7 @@ class Pilot:
         for part in (self._gate, self._limits, *stages, self.push_report):
             part.reset()
         self._first_ns = self._stamp_ns = -1
-        self._leaps = 0
+        self._jumps = 0
         self._commanded: Command | None = None  # of the tick, once there is one
         self.measurement: Measurement | None = None
         self.reference = Reference()
@@ -159,7 +160,7 @@ class Pilot:
     def thrust_limits(self) -> Limits | None:
         """Lower and upper thrust limits that the drive reports [N], (n,) each, or None for the configured ones.
 
-        What is assigned is checked and copied; a refused value is named in the commands and leaves the last in force.
+        The value is checked and copied; a refused one is named in the commands, and the last one stays in force.
         """
         return self._limits.accepted
 
@@ -201,7 +202,7 @@ class Pilot:
 
     @property
     def perception_result(self) -> PerceptionResult | None:
-        """What perception found in the last picture."""
+        """Result of perception for the last picture."""
         return self.camera.perception_result
 
     @property
@@ -286,8 +287,8 @@ class Pilot:
             dt = min((stamp_ns - self._stamp_ns) * 1e-9, LONGEST_TICK)
         self._first_ns, self._stamp_ns = stamp_ns if self._first_ns < 0 else self._first_ns, stamp_ns
         self.planning.time_s = (stamp_ns - self._first_ns) * 1e-9
-        if self._leaps != self._gate.clock.leaps:  # or the loop stood still for an unknown time
-            self._leaps = self._gate.clock.leaps
+        if self._jumps != self._gate.clock.jumps:  # or the loop stood still for an unknown time
+            self._jumps = self._gate.clock.jumps
             self.estimator.doubt()
         return dt
 
@@ -304,7 +305,7 @@ class Pilot:
         return self.camera.perceive(frame, velocity, hints, self.supervision.is_new_picture, rejected)
 
     def _check_axes(self, frame: SensorFrame, contact: ContactState, dt: float) -> tuple[str, ...]:
-        """Self-check with those raw sensors that the tick has; what it found."""
+        """Self-check with the raw sensors of the tick; returns the findings."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
         inertial = force = None
         if not any(name in missing for name in INERTIAL):

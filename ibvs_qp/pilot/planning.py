@@ -1,4 +1,4 @@
-"""Planning of a flight: what the strategy gets of the estimates, its command, and the reference that follows."""
+"""Planning of a flight: inputs of the strategy, its command, and the resulting reference."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.estimation import ASSUMED_DISTANCE, Estimation
 from ibvs_qp.supervision.supervision import Limits, Supervision
 
-#: States in which the strategy flies.
+#: States in which the strategy has control.
 FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 
 

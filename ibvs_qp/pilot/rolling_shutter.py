@@ -1,4 +1,4 @@
-"""Lines of a picture whose rows are exposed one after the other, as at the picture's stamp."""
+"""Lines of a picture whose rows are exposed in sequence, as at the picture's stamp."""
 
 from __future__ import annotations
 

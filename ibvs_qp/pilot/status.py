@@ -1,4 +1,4 @@
-"""Where a flight stands, for those who fly a Pilot."""
+"""Progress of a flight, for callers of a `Pilot`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a vehicle can paint: by its rotors, its reach, and what its camera has in view in contact."""
+"""Whether a vehicle can paint: by its rotors, its reach, and the view of its camera in contact."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ GOOD_REACH = 1.3
 #: Distance of the lens from a propeller's disc along its axis within which it counts as in it [m]: a lens, and blades
 #: that bend.
 _DISC_DEPTH_M = 0.03
-#: Least yaw at which a propeller may strike the wall [deg]: twice what a sliding tip turns the vehicle by.
+#: Least yaw at which a propeller may strike the wall [deg]: twice the turn by a sliding tip.
 _LEAST_STRIKE_DEG = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleCheck:
-    """What was found about a vehicle and a job.
+    """Findings about a vehicle and a job.
 
     Attributes:
-        problems: Why it cannot fly the job, one line each; empty if it can.
-        warnings: What makes the job hard.
+        problems: Why it cannot do the job, one line each; empty if it can.
+        warnings: Difficulties of the job.
         picture: The picture in contact; None for a vehicle whose rotors cannot carry it.
     """
 
@@ -39,7 +39,7 @@ class VehicleCheck:
 
 
 def vehicle_actuation(vehicle: VehicleParams) -> Actuation:
-    """What the rotors of a vehicle can do at its tip."""
+    """Actuation of a vehicle at its tip."""
     tip, weight = np.array(vehicle.tip_position_m), vehicle.mass_kg * GRAVITY
     return actuation(vehicle.geometry, weight, tip, vehicle.thrust_min, vehicle.thrust_max)
 
@@ -61,7 +61,7 @@ def check_vehicle(config: PilotConfig, push_n: float, found: Actuation | None = 
     Args:
         config: Vehicle, camera, brush and margins.
         push_n: Push of the job [N].
-        found: What its rotors can do, if it is known.
+        found: Its actuation, if it is known.
     """
     vehicle = config.controller.vehicle
     found = found or vehicle_actuation(vehicle)
@@ -89,7 +89,7 @@ def sliding_reach(vehicle: VehicleParams, found: Actuation, tilt_deg: float) -> 
 
     Args:
         vehicle: The vehicle, fully actuated.
-        found: What its rotors can do.
+        found: Its actuation.
         tilt_deg: Largest roll and pitch [deg]; 0 for a level one.
     """
     if tilt_deg == 0.0:

@@ -69,7 +69,7 @@ class CompiledSolver:
         self._start = start
 
     def solve(self) -> tuple[AcceptedSolution | None, Tried | None]:
-        """Solve the program of this tick; None if OSQP's answer fails the acceptance test, or the data is none."""
+        """Solve the program of this tick; None if OSQP's solution is not accepted or the data is not finite."""
         start = time.perf_counter()
         begin = None if self._start is None else ctypes.c_void_p(self._start.ctypes.data)
         solved = self._code.ibvs_solve_values(self._program, self._addresses, begin, self._found)

@@ -40,7 +40,7 @@ class LimitRange:
         change_low: Most negative change of the bound, in the row's unit; -inf where nothing ends it.
         change_high: Most positive change.
         cost_fall: By how much the cost falls as the bound yields to that end; less than the price times the change.
-        until: What happens there: "released", or the name of another limit with "active" or "released".
+        until: Event at that end: "released", or the name of another limit with "active" or "released".
     """
 
     change_low: float
@@ -131,8 +131,8 @@ class TickReplay:
         """
         data, problem = self._data, self._problem
         if point.shape != data.point.shape or not np.isfinite(point).all():
-            wanted = f"the program has {len(data.point)} finite inputs and states"
-            raise ConfigError(f"a recorded tick of {len(point)} numbers is refused: {wanted}")
+            expected = f"the program has {len(data.point)} finite inputs and states"
+            raise ConfigError(f"a recorded tick of {len(point)} numbers is refused: {expected}")
         data.point[:] = point
         data.evaluate()
         self._solver.reset()
@@ -228,7 +228,7 @@ def bound_ranges(
         y: Its multipliers, > 0 at an upper bound, exactly 0 of an inactive row, (rows,).
 
     Returns:
-        One range per active row; none if the active rows depend on each other.
+        One range per active row; an empty result if the active rows depend on each other.
 
     Source: Best, An algorithm for the solution of the parametric quadratic programming problem, 1996.
     """

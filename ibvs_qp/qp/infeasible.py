@@ -33,7 +33,7 @@ def conflicting_rows(problem: QpProblem, data: ProgramData) -> tuple[str, ...]:
         return ()
     scale = np.linalg.norm(rows, axis=1)
     scale[scale == 0.0] = 1.0
-    # Bounds as seen from the middle of the thrusts' box: numbers of a few newtons, whatever the rows' units.
+    # Bounds relative to the middle of the thrusts' box: numbers of a few newtons for rows of any unit.
     at = rows @ (0.5 * (lower[:rotors] + upper[:rotors]))
     table = np.column_stack((rows / scale[:, None], (lower - at) / scale, (upper - at) / scale))
     kept = _certificate(table, list(range(len(hard))))
@@ -43,7 +43,7 @@ def conflicting_rows(problem: QpProblem, data: ProgramData) -> tuple[str, ...]:
 
 
 def _certificate(table: np.ndarray, chosen: list[int]) -> list[int]:
-    """Rows of a proof that the chosen rows (coefficients, lower, upper) have no solution; none if they have one."""
+    """Rows of a proof that the chosen rows (coefficients, lower, upper) have no solution; empty if they have one."""
     if not chosen:  # nothing contradicts nothing; and scipy 1.17 crashes on an empty matrix
         return []
     from scipy.optimize import nnls  # heavy, and only a program without a solution needs it

@@ -65,7 +65,7 @@ class AffineRows:
 
 
 def _symmetric_product(left: ca.SX | ca.DM, right: ca.SX) -> ca.SX:
-    """Product known to be symmetric: only its upper triangle is computed, so that both are equal to the bit."""
+    """Product known to be symmetric: only its upper triangle is computed, so that both halves are bit-identical."""
     size = left.shape[0]
     upper = ca.SX(size, size)
     for i in range(size):
@@ -169,8 +169,8 @@ def _unlimited_thrusts(hessian: ca.SX, gradient: ca.SX) -> ca.SX:
 def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
     """Part of the way from thrusts to the vehicle's own limits that is clipped [N], (n,).
 
-    None for a rotor whose limit is reported (a weak one, say), where an error would last, and none with redundant
-    rotors, which give noise up at no cost of the wrench.
+    Zero for a rotor with a reported limit, such as a weak one, where an error would last, and for redundant rotors,
+    whose noise costs no wrench.
     """
     most = model.limits.thrust_noise_n
     if not model.config.thrust_rows or model.rotors > REDUNDANT_ABOVE:
@@ -242,9 +242,9 @@ def _refuse_curved(model: Model, row: str, expression: ca.SX, **others: ca.SX) -
     unknown = ca.veccat(model.thrust, model.acceleration)
     if ca.depends_on(ca.jacobian(expression, unknown), unknown):
         raise ConfigError(f"{row}: its expression must be affine in the thrusts")
-    for what, symbol in others.items():
+    for part, symbol in others.items():
         if ca.depends_on(ca.SX(symbol), unknown):
-            raise ConfigError(f"{row}: its {what} must not depend on the thrusts")
+            raise ConfigError(f"{row}: its {part} must not depend on the thrusts")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-r"""A solver of one program of fixed sparsity, and what the controller accepts of its solutions.
+r"""A solver of one program of fixed sparsity, and the acceptance test of its solutions.
 
 .. math:: \min \tfrac12 x^T P x + q^T x \quad\text{s.t.}\quad l \le A x \le u
 """
@@ -120,11 +120,11 @@ class Solver(ABC):
             from its bounds, by the library's own test.
         dense: P and A in full, for libraries that take dense matrices.
         workspace: Of the library; None until the first solve after a reset.
-        start: What the next set-up starts from, such as the iterate x, y; None from nothing.
+        start: Start of the next set-up, such as the iterate x, y; None for a cold start.
 
     Args:
         patterns: Sparsity of the program.
-        settings: Tolerance and iterations; each solver takes what its library has.
+        settings: Tolerance and iterations; each solver uses those of its library.
     """
 
     tests_residuals: ClassVar[bool] = False
@@ -211,6 +211,6 @@ def make_solver(patterns: ProgramPatterns, settings: SolverSettings) -> Solver:
     try:
         module = importlib.import_module(f"ibvs_qp.qp.solvers.{settings.name}")
     except ModuleNotFoundError as error:
-        wanted = f"the library {error.name} is not installed (pip install 'ibvs-qp[solvers]')"
-        raise ConfigError(f"solver.name = {settings.name!r} is refused: {wanted}") from None
+        missing = f"the library {error.name} is not installed (pip install 'ibvs-qp[solvers]')"
+        raise ConfigError(f"solver.name = {settings.name!r} is refused: {missing}") from None
     return module.SOLVER(patterns, settings)

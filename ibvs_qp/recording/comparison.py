@@ -1,4 +1,4 @@
-"""A controller on recorded inputs: whether its commands are bit-identical, and what another preset would command."""
+"""A controller on recorded inputs: whether its commands are bit-identical, and the commands of another preset."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def compare_preset(flight: RecordedFlight, preset: PilotConfig) -> PresetCompari
 def _unbroken(flight: RecordedFlight, result: Replay | PresetComparison) -> Iterator[RecordedTick]:
     """The ticks up to the first gap; the result gets the number missing there."""
     expected = 0
-    for tick in flight.ticks():  # to its end, which says whether the log is complete
+    for tick in flight.ticks():  # to its end, which shows whether the log is complete
         if tick.given.tick != expected and not result.missing:
             result.missing = tick.given.tick - expected
         if not result.missing:

@@ -64,7 +64,7 @@ def recorded_controller(facts: Mapping[str, str]) -> CheckedLaw | Assured:
     """The controller of a log, as before its first tick.
 
     Raises:
-        ConfigError: When only the code that flew can build it.
+        ConfigError: When only the code of the flight can build it.
     """
     if facts["law"] not in LAWS:
         raise ConfigError(f"flown by a law of its own, {facts['law']}; replay it from Python with that controller")

@@ -1,6 +1,6 @@
 """Protobuf messages of the log, made from the dataclasses that they carry: one description of every field.
 
-A float, an array and a tuple of numbers are doubles, so that what is read back is bit-identical. A value that its
+A float, an array and a tuple of numbers are doubles, so that values read back are bit-identical. A value that its
 field cannot hold, such as None for an attitude, is JSON in the field `MALFORMED`: the replayed controller must refuse
 it again.
 """

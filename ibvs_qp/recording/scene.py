@@ -1,7 +1,7 @@
 """Poses and shapes of vehicle, wall and forces, for viewers in three dimensions.
 
-Frame `WALL` has its origin at the wall, x into it, y to the left and z up, the wall as estimated; what is ahead of the
-tip at the start lies at y = z = 0. `VEHICLE` is B: front, right, down. Quaternions are (x, y, z, w), lengths in m.
+Frame `WALL` has its origin at the wall, x into it, y to the left and z up, the wall as estimated; the point ahead of
+the tip at the start lies at y = z = 0. `VEHICLE` is B: front, right, down. Quaternions are (x, y, z, w), lengths in m.
 """
 
 from __future__ import annotations

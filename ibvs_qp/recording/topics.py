@@ -1,4 +1,4 @@
-"""Topics of a tick: its exact inputs for replay, a row for plots, changes in words, and the pose at the wall."""
+"""Topics of a tick: its exact inputs for replay, a row for plots, changes as text, and the pose at the wall."""
 
 from __future__ import annotations
 
@@ -29,34 +29,60 @@ STEP, SUPERVISOR, RESET = "step", "supervisor", "reset"
 
 @dataclass(kw_only=True)
 class ControllerInput:
-    """Exact inputs of the controller at one tick, for replay."""
+    """Exact inputs of the controller at one tick, for replay.
 
-    tick: int  # number, from 0; a gap means lost ticks
-    call: str  # STEP, SUPERVISOR or RESET
-    measurement: Measurement | None = None  # as given to the controller
-    reference: Reference | None = None  # as given to the controller
-    contact: ContactState | None = None  # as a pilot estimates it; None where the controller estimates it
-    fixed_thrusts: np.ndarray | None = None  # of the supervisor [N], (n,), before box and rate limit
+    Attributes:
+        tick: Number, from 0; a gap means lost ticks.
+        call: ``step``, ``supervisor`` or ``reset``.
+        measurement: As given to the controller.
+        reference: As given to the controller.
+        contact: As a pilot estimates it; None where the controller estimates it.
+        fixed_thrusts: Of the supervisor [N], (n,), before box and rate limit.
+    """
+
+    tick: int
+    call: str
+    measurement: Measurement | None = None
+    reference: Reference | None = None
+    contact: ContactState | None = None
+    fixed_thrusts: np.ndarray | None = None
 
 
 @dataclass(kw_only=True)
 class ControlTick:
-    """One tick, for plots."""
+    """One tick, for plots.
 
-    tick: int  # as of the input
+    Attributes:
+        tick: Number of the tick, as in its `ControllerInput`.
+        stamp_ns: Time of the tick.
+        phase: Of a pilot's strategy; empty without a pilot.
+        safety: State of the supervisor; nominal without one.
+        safety_reasons: Why it is in that state.
+        rejected: Inputs refused by pilot and controller.
+        push_n: Filtered push [N].
+        push_reference_n: Push reference within reach [N].
+        distance_m: Tip to wall [m].
+        thrust_low_n: Lower thrust limits in force [N], (n,).
+        thrust_high_n: Upper thrust limits in force [N], (n,).
+        step_us: Duration of the step [us].
+        dropped: Entries dropped so far, because the writer was late.
+        command: Of the law, or of the supervisor in its place.
+    """
+
+    tick: int
     stamp_ns: int
-    phase: str  # of a pilot's strategy; empty without a pilot
-    safety: SafetyState  # of the supervisor; nominal without one
+    phase: str
+    safety: SafetyState
     safety_reasons: tuple[str, ...]
-    rejected: tuple[str, ...]  # inputs refused by pilot and controller
-    push_n: float  # filtered
-    push_reference_n: float  # within reach
-    distance_m: float  # tip to wall
-    thrust_low_n: np.ndarray  # limits in force, (n,)
+    rejected: tuple[str, ...]
+    push_n: float
+    push_reference_n: float
+    distance_m: float
+    thrust_low_n: np.ndarray
     thrust_high_n: np.ndarray
-    step_us: float  # duration of the step
-    dropped: int  # entries dropped so far, because the writer was late
-    command: Command  # of the law, or of the supervisor in its place
+    step_us: float
+    dropped: int
+    command: Command
 
 
 def write_message(log: LogWriter, topic: str, value: Any, kind: type | None = None) -> None:

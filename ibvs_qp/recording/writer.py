@@ -136,7 +136,7 @@ class LogWriter:
             self.problem = f"cannot write the log {self._file}: {error.strerror or error}; it ends there"
         except Exception as error:
             self.problem = f"the log {self._file} ends early ({type(error).__name__}: {error})"
-        with contextlib.suppress(OSError):  # of what is still buffered, after an error that was reported
+        with contextlib.suppress(OSError):  # of the buffered rest, after an error that was reported
             self._stream.close()
         self._closing.set()
         self._queue.clear()

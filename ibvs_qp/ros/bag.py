@@ -11,7 +11,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
-from ibvs_qp.ros.held import HeldSamples
+from ibvs_qp.ros.latest_samples import LatestSamples
 from ibvs_qp.ros.open_bag import OpenBag
 from ibvs_qp.ros.topics import ACCEPTED, CAMERA, SAMPLES, Topics
 
@@ -27,19 +27,19 @@ class Bag:
 
     Messages are taken in the order in which they were recorded. Every message of the IMU makes a frame with its stamp,
     and holds the last samples of the others that were recorded before it; a picture goes with the first frame after
-    both of its parts (`ibvs_qp.ros.held.HeldSamples`).
+    both of its parts (`ibvs_qp.ros.latest_samples.LatestSamples`).
 
     Attributes:
         held: Samples of the last pass, with the messages that were left out.
 
     Args:
         path: Folder with metadata.yaml, or a single file .mcap or .db3.
-        topics: Which topic carries what; None for the defaults.
+        topics: Names and axes of the topics; None for the defaults.
     """
 
     def __init__(self, path: str | Path, topics: Topics | None = None) -> None:
         self.path, self.topics = Path(path), topics or Topics()
-        self.held = HeldSamples(self.topics)
+        self.held = LatestSamples(self.topics)
 
     def sensor_frames(self, period_s: float = 0.004, distortion: tuple[float, ...] = ()) -> Iterator[SensorFrame]:
         """Frames for `ibvs_qp.Pilot.step`; without pictures where the bag has no topic of colour.
@@ -85,7 +85,7 @@ class Bag:
             roles: Roles to read.
             camera: Further ones, where the bag has the topic of the colour pictures.
         """
-        self.held = HeldSamples(self.topics)
+        self.held = LatestSamples(self.topics)
         with contextlib.closing(OpenBag(self.path)) as reader:
             if any(each.topic == self.topics.color for each in reader.connections):
                 roles = (*roles, *camera)

@@ -26,7 +26,7 @@ SENSOR_COMBINED, VEHICLE_ATTITUDE = "px4_msgs/msg/SensorCombined", "px4_msgs/msg
 
 
 class BadMessage(ValueError):
-    """A message that cannot be used; the text is one of few, whatever the message contains."""
+    """A message that cannot be used; the text is one of few, for any contents of the message."""
 
 
 @functools.cache

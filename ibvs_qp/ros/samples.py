@@ -1,7 +1,7 @@
 """Messages of inertial unit, attitude and force sensor to the vectors of a sensor frame, and back.
 
 ROS's messages are in front-left-up and east-north-up, PX4's in front-right-down and north-east-down
-(`ibvs_qp.axes`). ``linear_acceleration`` of ROS is what an accelerometer measures: +9.81 m/s^2 upwards at rest.
+(`ibvs_qp.axes`). ``linear_acceleration`` of ROS is the specific force of an accelerometer: +9.81 m/s^2 upwards at rest.
 A message with a number that is not finite, or whose sender marks the quantity as absent, raises BadMessage.
 """
 

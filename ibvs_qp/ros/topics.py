@@ -1,4 +1,4 @@
-"""Which topic carries what, and in which axes; a TOML file or code sets it."""
+"""Names and axes of the topics; set in a TOML file or in code."""
 
 from __future__ import annotations
 

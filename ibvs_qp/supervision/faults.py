@@ -46,7 +46,7 @@ class Rule:
 
     Attributes:
         stages: Pairs of time since the fault began [s] and state from then on, in the order of time.
-        bounds: Settings that detect it (`ibvs_qp.config.SafetySettings`), beside those of other parts.
+        bounds: Settings that detect it (`ibvs_qp.config.SafetySettings`), in addition to those of other parts.
         recovery_s: The fault counts as present for this long after its last detection [s].
     """
 
@@ -82,7 +82,7 @@ POLICY: dict[Fault, Rule] = {
     Fault.PLANE_STALE: Rule(_BLIND, ("plane_age_s", "first_picture_s")),
     Fault.LINES_STALE: Rule(((0.0, DEGRADED), (3.0, RETREAT)), ("lines_age_s",)),
     Fault.FILTER_REFUSES: Rule(((0.0, DEGRADED), (2.0, RETREAT)), ("refusal_s",)),
-    # Hover by the last attitude meanwhile; a clock that leaps is followed after a tenth of a second.
+    # Hover by the last attitude meanwhile; a clock that jumps is followed after a tenth of a second.
     Fault.NO_INPUT: Rule(((0.2, DEGRADED), (0.5, TERMINATED)), recovery_s=0.0),
     Fault.NO_ATTITUDE: Rule(((0.0, DEGRADED), (0.2, TERMINATED)), recovery_s=0.0),
     Fault.IMU_STALE: Rule(_UNSTEADY, ("imu_age_s",)),

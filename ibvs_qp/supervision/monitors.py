@@ -1,4 +1,4 @@
-"""Monitors: each compares one quantity of a tick with its bounds and adds what it finds to the faults of the tick."""
+"""Monitors: each compares one quantity of a tick with its bounds and adds its findings to the faults of the tick."""
 
 from __future__ import annotations
 
@@ -336,7 +336,7 @@ class EnvelopeMonitor:
             part.reset()
 
     def update(self, tick: Tick, time_s: float) -> None:
-        """Add what is outside the envelope; ``time_s`` is the time since the first tick [s]."""
+        """Add quantities outside the envelope; ``time_s`` is the time since the first tick [s]."""
         settings, cosine = self._settings, tick.down[2]
         turning, height = math.hypot(*tick.rate), abs(tick.height)
         inside = cosine >= self._tilt_cosine and turning <= settings.rate_rad_s
@@ -376,10 +376,10 @@ class RotorMonitor:
     def __init__(self, vehicle: VehicleParams, effectiveness: np.ndarray, settings: SafetySettings) -> None:
         self._settings, self._names = settings, vehicle.geometry.names
         self._box = vehicle.thrust_min, vehicle.thrust_max
-        # Column i: what a newton missing at rotor i looks like; with more than six rotors it spreads over others.
+        # Column i: signature of a missing newton at rotor i; with more than six rotors it spreads over others.
         inverse = np.linalg.pinv(effectiveness)
         self._signatures = inverse @ effectiveness
-        # What no force through the centre of mass explains.
+        # Part that no force through the centre of mass explains.
         self._not_wind = np.eye(len(inverse)) - inverse[:, :3] @ np.linalg.pinv(inverse[:, :3])
         self._lift = Persistence(settings.missing_lift_time_s)
         self._upwards = (-effectiveness[2]).tolist()
@@ -422,18 +422,19 @@ class RotorMonitor:
             self._suspect(missing, thrusts, time_s)
         words = [f"{name} gives {thrust:.1f} N" for name, thrust in self._found.items()]
         spread = settings.missing_sigmas * noise * math.sqrt(len(missing))
-        # More than what the rotors give cannot be missing: the accelerometer is wrong then.
+        # More than the thrust of the rotors cannot be missing: the accelerometer is wrong then.
         given = float(np.dot(self._upwards, thrusts)) + settings.missing_lift_n
         if self._lift.update(max(settings.missing_lift_n, spread) < lift <= given, time_s):
             words.append(f"{lift:.1f} N of lift are missing")
-            # Several rotors are weak: no gust, no push at the body. A small share of the thrust is a sagging battery.
+            # Several rotors are weak: no gust, no push at the body. A small fraction of the thrust is a sagging
+            # battery.
             for rotor in np.flatnonzero(missing > np.maximum(least, WEAK * thrusts)).tolist():
                 loss = float(missing[rotor] / self._signatures[rotor, rotor])
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss, stuck=False)
         return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
-        # While one rotor is followed, what it still misses must not be ascribed to a pair.
+        # While one rotor is followed, its remaining deficit must not be ascribed to a pair.
         rotors = self._explain(missing, 1 if len(self._found) == 1 else MOST_ROTORS)
         self._suspects = {rotor: self._suspects.get(rotor, time_s) for rotor in rotors}
         for rotor, since in self._suspects.items():
@@ -445,7 +446,7 @@ class RotorMonitor:
             self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 
     def _explain(self, missing: np.ndarray, most: int) -> Sequence[int]:
-        """Fewest rotors, ``most`` at most, whose missing thrusts explain what is missing; none if they do not."""
+        """Fewest rotors, ``most`` at most, whose missing thrusts explain the missing force; empty if they do not."""
         rest, chosen = missing, list[int]()
         most_left = UNEXPLAINED**2 * float(missing @ missing)
         if not self._found:

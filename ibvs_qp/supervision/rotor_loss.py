@@ -15,12 +15,12 @@ from ibvs_qp.frames import GRAVITY, roll_pitch
 
 #: Lateral force that a level hover may lack [N]: a third of a degree of tilt replaces it.
 LATERAL_SHORTFALL = 0.3
-#: Up to this trim [rad] a vehicle flies as a level one, forces and yaw included: one rotor stuck or limited near its
-#: hover thrust. Beyond it only the tilt moves the vehicle, and yaw is free.
+#: Up to this trim [rad] a vehicle is controlled as a level one, forces and yaw included: one rotor stuck or limited
+#: near its hover thrust. Beyond it only the tilt moves the vehicle, and yaw is free.
 LARGEST_TRIM = math.radians(8.0)
 #: A rotor whose limits are closer than this [N] is stuck: no level wrench controls the force in some direction then.
 STUCK_WIDTH = 2.0
-#: A thrust this near to a limit is at it [N]; a singular value below this share of the largest is zero [-].
+#: A thrust this near to a limit is at the limit [N]; a singular value below this fraction of the largest is zero [-].
 AT_LIMIT, LEAST_VALUE = 0.05, 1e-6
 #: Shortest tick of the lead [s].
 LEAST_TICK = 1e-3
@@ -35,7 +35,7 @@ ESCAPE_SPEED, ESCAPE_DISTANCE = 0.4, 1.7
 #: Speed with a rotor that is only limited [m/s].
 TRIMMED_SPEED = 0.15
 #: Distance error to speed [1/s]; velocity error to acceleration [1/s] and largest commanded acceleration [m/s^2] with
-#: a rotor lost: 7 deg of tilt beside the trim. A limited one may push to a wall 0.1 m away: faster, and 12 deg.
+#: a rotor lost: 7 deg of tilt in addition to the trim. A limited one may push to a wall 0.1 m away: faster, and 12 deg.
 DISTANCE_GAIN, VELOCITY_GAIN, ACCELERATION_BOUND = 1.0, 1.5, 1.2
 TRIMMED_VELOCITY_GAIN, TRIMMED_ACCELERATION_BOUND = 4.0, 2.0
 #: A vehicle without a level hover that turned farther from the wall than this turns on: cosine of 20 degrees.
@@ -45,7 +45,7 @@ LEAST_HORIZONTAL, LEAST_TILT = 1e-6, 1e-9
 
 
 class RotorLoss:
-    r"""Detects limits without a level hover and computes the tilt to fly then.
+    r"""Detects limits without a level hover, and computes the tilt for them.
 
     With one rotor lost no wrench of this vehicle carries it level without moments and without a lateral force: 16 N
     remain, for four rotors of six towards the wall. At the tilt of the remaining force :math:`F = B_F u` that force
@@ -111,7 +111,7 @@ class RotorLoss:
     def target(
         self, contact: ContactState, attitude: Sequence[float], along: float, dt: float
     ) -> dict[str, np.ndarray]:
-        """Attitude to fly at [rad], (2,), by its name in a `Reference`; empty for a vehicle that flies level.
+        """Commanded roll and pitch [rad], (2,), by its name in a `Reference`; empty for a vehicle that flies level.
 
         Args:
             contact: Wall and speed towards it.

@@ -1,7 +1,8 @@
-"""Supervision of one flight: what monitors and state machine do to reference, limits, contact wrench and thrusts.
+"""Supervision of one flight: effect of monitors and state machine on reference, limits, contact wrench and thrusts.
 
-A complex function (strategy, estimation, program) flies; simple monitors compare its inputs and effects with bounds,
-and a state machine replaces its reference, and at last its thrusts, by safe ones (run-time assurance, ASTM F3269).
+A complex function (strategy, estimation, program) has control; simple monitors compare its inputs and effects with
+bounds, and a state machine replaces its reference, and at last its thrusts, by safe ones (run-time assurance, ASTM
+F3269).
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ _STILL.flags.writeable = False
 
 
 class Supervision:
-    """Watches every tick and supervises the next one; `Pilot` and `Assured` hand it what they have.
+    """Watches every tick and supervises the next one; `Pilot` and `Assured` pass it their data.
 
     Attributes:
         settings: Bounds of the monitors and motions of the states.
@@ -124,7 +125,7 @@ class Supervision:
         contact: ContactState,
         dt: float,
     ) -> tuple[str, ...]:
-        """Self-check with those sensors that the tick has; what it found, for `Command.rejected`.
+        """Self-check with the sensors of the tick; the findings, for `Command.rejected`.
 
         ``inertial`` are attitude, gyro and accelerometer as measured, ``force`` is that of the vehicle on the tool [N].
         """
@@ -142,7 +143,7 @@ class Supervision:
         return self.replaced_wrench(sample[1], now_ns, turned, setpoints) or sample
 
     def replaced_wrench(self, sample_ns: int, now_ns: int, turned: bool, setpoints: Setpoints) -> WrenchSample | None:
-        """What `contact_wrench` has in place of a sample of that time; None while the sample counts."""
+        """Wrench in place of a sample of that time; None while the sample counts."""
         wrench, last = None, self._last
         if last is not None and last.faults and self.settings.supervise:
             if any(fault in last.faults for fault in _WRENCH):
@@ -166,17 +167,17 @@ class Supervision:
         lower = np.maximum(reported[0], found[0])
         return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
 
-    def reference(self, wanted: Reference) -> Reference:
+    def reference(self, requested: Reference) -> Reference:
         """The reference that the state allows in place of the caller's."""
         state, last = self.state, self._last
         if state is SafetyState.NOMINAL or last is None:
-            return wanted
+            return requested
         if state is SafetyState.DEGRADED:  # no travel, and no new contact
-            pressing = wanted.contact and last.contact.in_contact
-            stop = wanted.standoff if not wanted.contact else max(last.contact.distance, LEAST_STOP)
-            return dataclasses.replace(wanted, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
+            pressing = requested.contact and last.contact.in_contact
+            stop = requested.standoff if not requested.contact else max(last.contact.distance, LEAST_STOP)
+            return dataclasses.replace(requested, velocity=_STILL, travel=_STILL, contact=pressing, standoff=stop)
         down = np.array((0.0, self._descend_speed)) if state is SafetyState.DESCEND else _STILL
-        return Reference(standoff=self._retreat_m, velocity=down, tilt=wanted.tilt, trim=wanted.trim)
+        return Reference(standoff=self._retreat_m, velocity=down, tilt=requested.tilt, trim=requested.trim)
 
     @property
     def _descend_speed(self) -> float:
@@ -185,7 +186,7 @@ class Supervision:
         return self.settings.fast_descend_speed_m_s if fast else self.settings.descend_speed_m_s
 
     def thrusts(self, setpoints: Setpoints) -> np.ndarray | None:
-        """Thrusts in place of those of the law [N], (n,); None while the law flies."""
+        """Thrusts in place of those of the law [N], (n,); None while the law has control."""
         if self.state is SafetyState.TERMINATED:
             return setpoints.floor
         return setpoints.last if Fault.NO_ATTITUDE in self.faults and self.settings.supervise else None
@@ -258,7 +259,7 @@ class Supervision:
         Returns:
             The state, which holds for the next tick.
         """
-        if self._first_ns < 0 or not self.settings.supervise:  # before the first good tick nothing flies
+        if self._first_ns < 0 or not self.settings.supervise:  # before the first good tick nothing is controlled
             return self.state
         self._time_s += self._tick_s
         return self.supervisor.update(self._time_s, {Fault.NO_INPUT: ""})

@@ -16,7 +16,7 @@ class BoundFunction:
     """A function bound to the memory of its arguments and results; nothing is copied or allocated in a call.
 
     Attributes:
-        evaluate: The same as calling it, half as long for what runs every tick.
+        evaluate: The same as calling it in half the time, for functions of every tick.
 
     Args:
         function: The function; may be shared by any number of bindings.
@@ -46,7 +46,7 @@ class BoundFunction:
 
 
 class ArrayFunction:
-    """A CasADi function from arrays to arrays, for what is evaluated now and then."""
+    """A CasADi function from arrays to arrays, for occasional evaluation."""
 
     def __init__(self, name: str, arguments: list[ca.SX], results: list[ca.SX]) -> None:
         self._function = ca.Function(name, arguments, results)

@@ -11,7 +11,7 @@ Number = ca.SX | ca.DM | float
 
 
 def where(condition: ca.SX, then: Number, otherwise: Number) -> ca.SX:
-    """The first of two expressions where a condition holds, else the second; what is not selected may be NaN."""
+    """The first of two expressions where a condition holds, else the second; the other may be NaN."""
     return ca.if_else(condition, then, otherwise)
 
 

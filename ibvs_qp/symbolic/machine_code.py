@@ -4,8 +4,8 @@ CasADi evaluates a function instruction by instruction, about 7 ns each; a compi
 gives the same bits (no contraction of products and sums, the same mathematical library). Without a
 compiler, or after any failure, CasADi interprets the function.
 
-A library is code that runs with the user's rights, so the cache is trusted no further than its owner, permissions and
-content tell: the file's name ends in the hash of its content.
+A library is code that runs with the user's rights, so its owner, permissions and content are checked
+before it is loaded: the file's name ends in the hash of its content.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ibvs_qp.config.files import read_bytes
 
 #: How a function is translated: -O1 takes 1 s for a tick of 4000 instructions, and -O3 gives code no faster.
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
-#: Random inputs on which the machine code must agree to the bit.
+#: Random inputs on which the machine code must be bit-identical.
 TRIALS = 8
 #: Time that compilers may take in one process [s], all runs together: a tick and its solver need 4 s on an idle core.
 PATIENCE_S = 30.0
@@ -52,7 +52,7 @@ def machine_code(function: ca.Function) -> ca.Function:
         function: Any function of numbers; its name must be a C identifier.
 
     Returns:
-        A function with the same name, inputs and outputs, whose results agree to the bit.
+        A function with the same name, inputs and outputs, whose results are bit-identical.
 
     Source: CasADi user guide, section 5.2 (generated code and ``external``).
     """
@@ -95,7 +95,7 @@ def cache_folder() -> Path:
 
 
 def shared_library(name: str, sources: Mapping[str, str], command: list[str], flags: tuple[str, ...]) -> Path:
-    """Shared library of some C code, from the cache if it was compiled before and is what was compiled.
+    """Shared library of some C code, from the cache if it was compiled before and is unchanged.
 
     Args:
         name: First part of the file's name.
@@ -118,7 +118,7 @@ def shared_library(name: str, sources: Mapping[str, str], command: list[str], fl
     for library in folder.glob(f"{name}-{key}-*.so"):
         if _intact(library):
             return library
-        log.warning("%s is not what was compiled, or others can write it: compiled anew", library)
+        log.warning("%s has changed since it was compiled, or others can write it: compiled anew", library)
         library.unlink()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         made = Path(scratch) / f"{name}.so"
@@ -137,7 +137,7 @@ def _hash(content: bytes) -> str:
 
 
 def _intact(library: Path) -> bool:
-    """Whether a file is this user's alone and has the content that its name tells."""
+    """Whether a file is this user's alone and has the content of the hash in its name."""
     try:
         return _only_ours(library, stat.S_ISREG) and library.stem.endswith("-" + _hash(read_bytes(library, _LARGEST)))
     except (IbvsQpError, OSError):
@@ -151,12 +151,12 @@ def _only_ours(path: Path, is_kind: Callable[[int], bool]) -> bool:
 
 
 def compiler() -> list[str] | None:
-    """The C compiler's command (``CC``, else cc), or None where there is none."""
+    """The C compiler's command (``CC``, else cc), or None without a compiler."""
     command = list(_words(os.environ.get("CC", "cc")))
     return command if os.name == "posix" and command and shutil.which(command[0]) else None
 
 
-@functools.cache  # a command that is none is reported once, however many functions are translated
+@functools.cache  # an invalid command is reported once, however many functions are translated
 def _words(given: str) -> tuple[str, ...]:
     try:
         return tuple(shlex.split(given))
@@ -167,7 +167,7 @@ def _words(given: str) -> tuple[str, ...]:
 
 @functools.cache
 def compiler_version(*command: str) -> bytes:
-    """What a compiler tells of itself; raises as `run_compiler`."""
+    """Version string of a compiler; raises as `run_compiler`."""
     return run_compiler([*command, "--version"])
 
 

@@ -52,7 +52,7 @@ class Signals:
         return value
 
     def copy(self) -> Signals:
-        """The same symbols; what is named in the copy stays in it."""
+        """The same symbols; names added to the copy stay in it."""
         other = copy.copy(self)
         for name, table in vars(self).items():
             setattr(other, name, dict(table))

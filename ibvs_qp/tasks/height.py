@@ -21,7 +21,7 @@ LEAST_WEIGHT = 1e-6
 class HeightTask(Task):
     r"""Acceleration along down of the wall plane, weighted far above push and sideways motion.
 
-    Its target equals what the line or velocity task already demands vertically; it only adds priority when thrust
+    Its target equals the vertical demand of the line or velocity task; it only adds priority when thrust
     saturates. A rotor at its idle floor adds lift: with push, sideways motion and height weighted alike the program
     lets the vehicle climb by a third of the missing force. A horizontal line demands :math:`r^T \dot\nu = \ddot e`
     with r its row. With roll, pitch, yaw and sideways motion at their targets the rest of it is vertical:

@@ -35,7 +35,7 @@ class LineState:
         analytic_row: Row of the analytic law on the body's acceleration, (1, 6); analytic_command: image acceleration
             for it [1/s^2].
         angle_error: theta minus its reference [rad]; angle_rate: its rate [rad/s]; angle_command: [rad/s^2].
-        image_rate: Rate of rho in the picture, whatever its reference does [1/s].
+        image_rate: Rate of rho in the picture, without that of its reference [1/s].
         weight: Of the rows, 0 to 1: presence, confidence and variance of the line.
     """
 
@@ -56,7 +56,7 @@ class LineState:
 
 
 class LineTask(Task):
-    r"""One line of the picture converges to its reference, as seen from the tip's wall point.
+    r"""One line of the picture converges to its reference, about the tip's wall point.
 
     .. math:: L S \dot\nu = -(K_p e + K_d (\dot e + T L S \dot\nu_{now}) + K_i \textstyle\int e), \qquad
               e = \rho - (x_t\cos\theta + y_t\sin\theta) - (\rho_{ref} - x_0 \cos\theta_{ref} - y_0 \sin\theta_{ref})

@@ -16,7 +16,7 @@ FORCE_INTEGRAL_BOUND = 8.0
 #: The filter adds the part of the last target that limits removed, at most [N]: noise of a push at its reach. More
 #: would put the full weight of an unreachable push on the other rows.
 PUSH_DEFICIT_BOUND = 0.4
-#: And at most this ratio to the wrench given up [N per N or N m]: a limit that is just touched changes nothing at once.
+#: And at most this ratio to the unallocated wrench [N per N or N m]: the effect of a limit begins at zero.
 PUSH_DEFICIT_RATIO = 4.0
 
 
@@ -65,12 +65,12 @@ class PushTask(Task):
     def _filtered(self, model: Model, target: ca.SX) -> ca.SX:
         """Target behind the filter [N]: a limit that noise reaches for a tick does not lower the push of the next.
 
-        The part removed is last target minus last command, with the present disturbance; the wrench given up is zero
+        The part removed is last target minus last command, with the present disturbance; the unallocated wrench is zero
         within the limits.
         """
         row, signals, filter_s = model.force_along_normal, model.signals, model.gains.push_filter_s
         missing = signals.state("push_target") - model.at(row, model.acceleration_commanded)
-        bound = ca.fmin(PUSH_DEFICIT_RATIO * signals.input("given_up"), PUSH_DEFICIT_BOUND)
+        bound = ca.fmin(PUSH_DEFICIT_RATIO * signals.input("unallocated"), PUSH_DEFICIT_BOUND)
         deficit = clamp(missing, -bound, bound)
         filtered = model.filtered(target, row, filter_s) + model.filter_share(filter_s) * deficit
         return signals.remember("push_target", filtered)

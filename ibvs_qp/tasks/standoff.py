@@ -46,7 +46,7 @@ class StandoffTask(Task):
     .. math:: F = m K_d (v - (-\dot e_s)) + F_{search}, \quad v = \min(K_p (e_s - e_{ref}), v_{max}(e_s))
 
     `Model.filtered` follows with the filter of the push row, except with a rotor lost: the damping amplifies noise. The
-    output "standoff_command" is the unfiltered force: the analytic law adds to it what its lines need along n, and a
+    output "standoff_command" is the unfiltered force: the analytic law adds the demand of its lines along n, and a
     filter would feed that part back.
     """
 
@@ -57,7 +57,7 @@ class StandoffTask(Task):
         tilted, force, lost = model.attitude.tilted, self.force(model), _lost_force(model)
         model.output("standoff_command", ca.if_else(tilted, lost, force))
         filtered = model.filtered(force, model.force_along_normal, model.gains.push_filter_s)
-        level = ca.if_else(tilted, LOST_WEIGHT, 1.0)  # what it cannot reach shall not cost moments
+        level = ca.if_else(tilted, LOST_WEIGHT, 1.0)  # an unreachable force shall not cost moments
         return [
             TaskRow(
                 name="standoff",

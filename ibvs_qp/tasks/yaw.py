@@ -13,7 +13,7 @@ from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.tasks.task import Task
 
 #: With a rotor lost: largest yaw acceleration [rad/s^2] and weight over that of a level vehicle [-]. The moment that is
-#: left about the vertical has one sign; yaw takes what roll and pitch leave.
+#: left about the vertical has one sign; yaw takes the remainder of roll and pitch.
 LOST_ACCELERATION, LOST_WEIGHT = 2.0, 0.05
 #: Beyond this angle a vehicle that lost a rotor only damps the turn [rad].
 LARGEST_TURN = 0.5 * math.pi

@@ -14,13 +14,13 @@ Part = TypeVar("Part", RgbdFrame, FeatureFrame)
 
 
 class CaptureGate:
-    """Brings pictures and features into the pilot's time; what is untimely, repeated or no picture is named.
+    """Brings pictures and features into the pilot's time; untimely, repeated and invalid ones are rejected by name.
 
-    Their contents are judged by perception, and by `ibvs_qp.validation.features`.
+    Their contents are checked by perception, and by `ibvs_qp.validation.features`.
 
     Args:
         clock: Of the sensor frames.
-        latest_s: What is older than this at delivery is refused [s].
+        latest_s: A picture older than this at delivery is refused [s].
     """
 
     def __init__(self, clock: MonotonicClock, latest_s: float) -> None:
@@ -78,5 +78,5 @@ class CaptureGate:
         return time
 
     def _at_latest_now(self, time: int) -> int:
-        """What is stamped a little ahead was captured at the tick: no filter knows a later state."""
+        """A stamp slightly ahead counts as that of the tick: no filter has a later state."""
         return min(time, self._clock.last_ns)

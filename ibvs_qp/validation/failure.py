@@ -15,7 +15,7 @@ def type_name(value: object) -> str:
 
 
 def raised(where: str, error: BaseException) -> str:
-    """What was raised and in which line; never raises, and has no text of the exception, which may be a caller's."""
+    """Type and line of an exception; never raises, and has no text of the exception, which may be a caller's."""
     trace = _trace_of(error)
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

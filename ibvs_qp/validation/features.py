@@ -1,4 +1,4 @@
-"""Results of perception: what is unsound is dropped by name before a filter reads it."""
+"""Results of perception: invalid parts are dropped by name before a filter reads them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ LEAST_EIGENVALUE = -1e-9
 
 
 def check_features(features: FeatureFrame, most_lines: int, rejected: list[str]) -> FeatureFrame:
-    """The features whose every number is plain, finite and within bounds; what is not is dropped.
+    """The features whose every number is plain, finite and within bounds; others are dropped.
 
     Args:
         features: With a sound stamp.
         most_lines: So many lines are looked at.
-        rejected: Receives the name and reason of what is dropped.
+        rejected: Receives the names and reasons of dropped parts.
     """
     features = plain_instance(features, FeatureFrame)
     plane = None if features.plane is None else read_plane(features.plane)
@@ -53,7 +53,7 @@ def _identified(lines: tuple[LineFeature, ...]) -> tuple[LineFeature, ...]:
 
 
 def _velocity(features: FeatureFrame, rejected: list[str]) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Velocity and its covariance; one without the other is none."""
+    """Velocity and its covariance; None if one of them is missing."""
     if features.velocity is None:
         return None, None
     entries, covariance = _VELOCITY.entries(features.velocity), matrix(features.velocity_covariance, 3)

@@ -100,7 +100,7 @@ class FieldTable:
             rejected: Receives the name and reason of every value refused.
 
         Returns:
-            The entries in force; the plain values of what was converted or replaced; and the names of what was refused.
+            The entries in force; the plain values of converted or replaced ones; and the names of refused ones.
         """
         entries: Entries = {}
         changes: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""Checks of lines and planes: what is accepted has plain numbers, converted where it had not."""
+"""Checks of lines and planes: accepted ones have plain numbers, converted if necessary."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ibvs_qp.validation.numbers import FLOAT, attempt, matrix, number, text, vec
 
 #: Largest rho [-] and theta [rad].
 LINE_BOUND = 1e6
-#: Largest variance: of what was not seen.
+#: Largest variance, of an unobserved quantity.
 VARIANCE_BOUND = 1e12
 #: Largest identity of a track: logs hold 64 bits.
 TRACK_BOUND = 2**63 - 1
@@ -34,14 +34,14 @@ _PLAIN = (float, float, float, str, str, int, int, int, np.ndarray)
 def read_lines(
     lines: Any, read: Callable[[Any], Line | None], most: int, name: str, rejected: list[str]
 ) -> tuple[Line, ...]:
-    """The accepted ones of the first ``most`` lines or line references; the tuple itself where it is plain.
+    """The accepted ones of the first ``most`` lines or line references; the same tuple if it is plain.
 
     Args:
-        lines: Whatever the caller passed.
+        lines: Any input of the caller.
         read: `read_line` or `read_line_reference`.
-        most: So many are looked at, whatever their number: a tick has a deadline.
+        most: Largest number of checked entries: a tick has a deadline.
         name: Of the input.
-        rejected: Receives name and reason of what is refused.
+        rejected: Receives name and reason of refused ones.
     """
     if type(lines) not in (tuple, list):
         rejected.append(f"{name}: not a tuple of lines")
@@ -62,7 +62,7 @@ def read_lines(
 
 
 def read_line(line: Any) -> LineFeature | None:
-    """A `LineFeature` with plain numbers within bounds, or None; the line itself where nothing has to be converted."""
+    """A `LineFeature` with plain numbers within bounds, or None; the same line if nothing has to be converted."""
     if not issubclass(type(line), LineFeature):
         return None
     values = _values(line)

@@ -23,9 +23,9 @@ from ibvs_qp.config.safety import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 
-#: Averaging time [s]: within that of the tare, and longer while noise is not small beside the allowed errors.
+#: Averaging time [s]: within that of the tare, and longer while noise is not small against the allowed errors.
 MEAN_TIME, LONGEST_TIME = 0.4, 3.0
-#: Standard deviations of a mean that count as its error, and part of the allowed error that is small beside it [-].
+#: Standard deviations of a mean that count as its error, and part of the allowed error that is small against it [-].
 NOISE_SIGMAS, SMALL_NOISE = 3.0, 0.5
 #: At rest the mean specific force has the length of gravity to this error [m/s^2].
 REST_FORCE_ERROR = 1.5
@@ -47,7 +47,7 @@ class LoadCheck:
     Attributes:
         done: Whether the readings were compared.
         faults: A turned sensor, in words.
-        note: What was found that is no fault: a sensor zeroed by its driver, or with a large zero offset.
+        note: A finding that is no fault: a sensor zeroed by its driver, or with a large zero offset.
 
     Args:
         vehicle: Tool, and place of the sensor.
@@ -135,7 +135,7 @@ class _Load(NamedTuple):
 
     @property
     def shows_turns(self) -> bool:
-        """Whether it is large enough beside its error."""
+        """Whether it is large enough compared with its error."""
         return self.error <= LARGEST_PART * self.size
 
     @property
@@ -180,8 +180,8 @@ def smallest_turns_deg(vehicle: VehicleParams, settings: SafetySettings) -> dict
     r"""Smallest turn of the force sensor about x, y and z that is found at rest for sure, in level flight [deg].
 
     A turn by :math:`\varphi` about the unit axis e moves a load L by :math:`2 |e \times L| \sin(\varphi/2)`. It is
-    found for sure when that is twice the error of a reading, of which the zero offset may hide one half, and the turn
-    counts beside what a sensor in place shows. Infinite where neither weight nor moment shows the turn.
+    found with certainty when that is twice the error of a reading, of which the zero offset may hide one half, and the
+    turn counts relative to the reading of a sensor in place. Infinite where neither weight nor moment shows the turn.
     """
     weight = vehicle.tool_mass_kg * np.array([0.0, 0.0, -GRAVITY])
     found = dict.fromkeys(_AXES, math.inf)

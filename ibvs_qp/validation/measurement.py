@@ -27,7 +27,7 @@ def answered_stamp(measurement: Any) -> int:
     """Stamp of an input of any type, 0 if it has none."""
     try:
         stamp = stamp_of(measurement.stamp_ns)
-    except Exception:  # whatever an attribute of something else does
+    except Exception:  # an attribute of any other type may raise
         stamp = None
     return 0 if stamp is None else stamp
 
@@ -73,7 +73,7 @@ class MeasurementGate:
         )
 
     def check(self, measurement: Any) -> tuple[Measurement | None, tuple[str, ...]]:
-        """The measurement with rejected fields replaced, and what was rejected.
+        """The measurement with rejected fields replaced, and the rejections.
 
         Returns:
             None for the measurement when its stamp is refused or no attitude was ever accepted.
@@ -187,7 +187,7 @@ class MeasurementGate:
             changes["lines"] = lines
 
     def _check_velocity_time(self, measurement: Measurement, changes: dict[str, Any], rejected: list[str]) -> None:
-        """A velocity of an unknown time is none."""
+        """Reject a velocity without a valid stamp."""
         stamp = measurement.velocity_stamp_ns
         if stamp is None or measurement.velocity is None:
             return

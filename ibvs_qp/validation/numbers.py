@@ -1,4 +1,4 @@
-"""Plain numbers of whatever a caller passes, or None for what is refused.
+"""Plain numbers of any input of a caller, or None for a refused one.
 
 Accepted are integers and floats of Python and numpy, alone, in lists, tuples and plain arrays of the right shape. A
 subclass of an array (masked, with units) is refused: its numbers may mean something else.
@@ -19,7 +19,7 @@ Read = TypeVar("Read")
 
 
 def attempt(read: Callable[[Any], Read | None], value: Any) -> Read | None:
-    """What is read of a value; None if it raises, whatever it is."""
+    """Result of reading a value; None if it raises anything."""
     try:
         return read(value)
     except Exception:  # of a class of the caller's
@@ -64,7 +64,7 @@ def vector(value: Any, size: int) -> list[float] | None:
 
 
 def matrix(value: Any, size: int) -> np.ndarray | None:
-    """A square array of numbers, any of them NaN or infinite, (size, size); the value itself where it is plain."""
+    """A square array of numbers, any of them NaN or infinite, (size, size); the same value if it is plain."""
     if type(value) is np.ndarray:
         if value.shape != (size, size) or value.dtype.kind not in "fiu":
             return None
@@ -81,7 +81,7 @@ def text(value: Any) -> str | None:
 
 
 def described(value: Any) -> str:
-    """Type of a refused value, of a plain array also its entries and shape, in a few words whatever it is."""
+    """Type of a refused value, of a plain array also its entries and shape, in a few words."""
     if type(value) is np.ndarray:
         return f"array of {str(value.dtype)[:20]} with shape {str(value.shape)[:40]}"
     return type_name(value)

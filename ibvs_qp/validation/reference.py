@@ -33,7 +33,7 @@ class ReferenceGate:
         return Reference(contact=self._contact, lines=self._lines, **REFERENCE.values(self._last))
 
     def check(self, reference: Any) -> tuple[Reference, tuple[str, ...]]:
-        """The new reference if all of it is accepted, otherwise the last one; and what was rejected."""
+        """The new reference if all of it is accepted, otherwise the last one; and the rejections."""
         if not issubclass(type(reference), Reference):
             return self.last, ("reference: not a Reference",)
         reference, rejected = plain_instance(reference, Reference), []

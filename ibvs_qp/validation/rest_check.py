@@ -24,7 +24,7 @@ class RestCheck:
     """Finds an accelerometer or an attitude in other axes than FRD and NED.
 
     Attributes:
-        passed: Whether a rest was seen at which both were right.
+        passed: Whether both were right during a rest.
         faults: In words.
     """
 
@@ -43,10 +43,10 @@ class RestCheck:
         self._time, self._rate = self._time + dt, max(self._rate, math.hypot(*rate))
         self._force, self._down = add_scaled(self._force, dt, force), add_scaled(self._down, dt, down)
         if self._time >= MEAN_TIME:
-            self._judge(add_scaled((0.0, 0.0, 0.0), 1.0 / self._time, self._force))
+            self._evaluate(add_scaled((0.0, 0.0, 0.0), 1.0 / self._time, self._force))
             self._begin()
 
-    def _judge(self, force: Vector3) -> None:
+    def _evaluate(self, force: Vector3) -> None:
         length = math.hypot(*force)
         at_rest = self._rate <= REST_RATE and abs(length - GRAVITY) <= REST_FORCE_ERROR
         fault = self._force_fault(force, length, at_rest) or self._attitude_fault(force, length, at_rest)

@@ -19,7 +19,7 @@ from ibvs_qp.validation.turn_check import TurnCheck
 
 
 class SelfCheck:
-    """Checks the axes of attitude, inertial sensors and force sensor; `faults` names what it found.
+    """Checks the axes of attitude, inertial sensors and force sensor; `faults` has its findings.
 
     Attributes:
         done: Whether nothing is left to check: after a first touch with the right axes, or disabled.
@@ -46,7 +46,7 @@ class SelfCheck:
         return self.done or (self._rest.passed and not self.faults())
 
     def faults(self) -> tuple[str, ...]:
-        """What was found, in words; empty without a fault, and after a first touch with the right axes."""
+        """Findings in words; empty without a fault, and after a first touch with the right axes."""
         if self.done:
             return ()
         load = () if self._load is None else self._load.faults
@@ -54,7 +54,7 @@ class SelfCheck:
 
     @property
     def note(self) -> str:
-        """What the check of the force sensor's load found that is no fault."""
+        """Finding of the check of the force sensor's load that is no fault."""
         return "" if self._load is None else self._load.note
 
     def inertial(self, attitude: Sequence[float], rate: Sequence[float], force: Sequence[float], dt: float) -> None:

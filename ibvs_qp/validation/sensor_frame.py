@@ -36,7 +36,7 @@ class SensorGate:
         self.replaced: tuple[str, ...] = ()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
-        """A copy of the frame in the pilot's time with rejected sensors replaced, and what was rejected.
+        """A copy of the frame in the pilot's time with rejected sensors replaced, and the rejections.
 
         Returns:
             None for the frame when its stamp is refused.
@@ -53,7 +53,7 @@ class SensorGate:
         image = self._captures.image(frame.image, rejected)
         features = frame.features
         if image is not None and features is not None:
-            rejected.append("features: not used beside an image")
+            rejected.append("features: not used together with an image")
             features = None
         checked = SensorFrame(
             stamp_ns=self.clock.last_ns,

@@ -16,7 +16,7 @@ class ThrustLimits:
 
     Attributes:
         accepted: The last accepted pair [N], (n,) each, not writeable; None for the configured limits.
-        rejected: Name and reason of what was assigned since and refused.
+        rejected: Name and reason of values assigned since and refused.
 
     Args:
         rotors: Number of rotors.

@@ -9,7 +9,7 @@ from ibvs_qp.frames import Vector3, add_scaled, dot
 
 #: Beyond this distance the sensor's mean is the load without contact [m]; averaging time at least and at most [s].
 FREE_DISTANCE, LEAST_TIME, LONGEST_TIME = 0.04, 0.5, 5.0
-#: A touch is judged within this distance of the wall [m], beyond this force [N] and this many standard deviations in
+#: A touch is evaluated within this distance of the wall [m], beyond this force [N] and this many standard deviations in
 #: free flight; the force is filtered over this time [s].
 TOUCH_DISTANCE, TOUCH_FORCE, TOUCH_SIGMAS, FILTER_TIME = 0.02, 2.0, 6.0, 0.1
 #: Cosine of the angle between the force and the normal out of the wall: at least with a friction of 0.8 and right

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-#: Duration of one turn [s]. An axis is judged once its gyro turns, as root of the sum of squares, exceed an angle [rad]
-#: and this multiple of the noise in one turn of the attitude [-]. The standard deviation of the correlation is then at
-#: most 0.2.
+#: Duration of one turn [s]. An axis is checked once its gyro turns, as root of the sum of squares, exceed an angle
+#: [rad] and this multiple of the noise in one turn of the attitude [-]. The standard deviation of the correlation is
+#: then at most 0.2.
 TURN_TIME, LEAST_TURN, LEAST_RATIO = 0.25, math.radians(0.7), 5.0
 #: Turns after which that noise is known.
 LEAST_TURNS = 4
 #: Correlation of both over the gyro's square, below which they oppose each other: 1 right, -1 with a wrong sign.
 OPPOSED = -0.5
-#: A turn of the attitude counts up to this multiple of the gyro's: yaw is arbitrary and may leap.
+#: A turn of the attitude counts up to this multiple of the gyro's: yaw is arbitrary and may jump.
 LARGEST_RATIO = 2.0
-#: Largest difference of the two turns that enters the noise [rad]; a leap of yaw is larger.
+#: Largest difference of the two turns that enters the noise [rad]; a jump of yaw is larger.
 LARGEST_NOISE = math.radians(3.0)
 
 

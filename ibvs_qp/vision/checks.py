@@ -1,4 +1,4 @@
-"""What guards a picture: refusal with its reason, tolerant reading of vectors, times of the stages."""
+"""Checks of a picture: refusal with its reason, tolerant reading of vectors, times of the stages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_PIXELS = 1920 * 1200
 STEADY_PICTURES = 5
 #: Smallest focal length, and largest entry of the intrinsics [px].
 _SHORTEST_FOCAL, _INTRINSICS_BOUND = 1.0, 1e5
-#: No RGB-D camera sees a surface as far as this [m]: a larger median is in millimetres.
+#: No RGB-D camera measures a surface as far as this [m]: a larger median is in millimetres.
 _FARTHEST = 100.0
 #: Distance of the pixels of that median [px].
 _SPARSE = 16
@@ -81,8 +81,8 @@ class PictureGate:
         self._seen = self._seen + 1 if self._other == camera else 1
         self._other = camera
         if self._seen < STEADY_PICTURES:
-            what = "size" if self._camera[:2] != camera[:2] else "intrinsics"
-            return f"another {what} than the pictures before, {self._seen} of {STEADY_PICTURES} until it is followed"
+            other = "size" if self._camera[:2] != camera[:2] else "intrinsics"
+            return f"another {other} than the pictures before, {self._seen} of {STEADY_PICTURES} until it is followed"
         self._camera, self._other = camera, None
         return None
 
@@ -97,7 +97,7 @@ def _unit_problem(depth: np.ndarray) -> str | None:
     return f"depth picture with a median of {median:.4g}: metres are needed, these look like millimetres"
 
 
-#: Tells the time of the stages [s]: by the wall. A bench puts the thread's own time here, undisturbed by neighbours.
+#: Clock of the stages [s]: wall-clock time. A bench puts the CPU time of the thread here.
 stage_time: Callable[[], float] = time.perf_counter
 
 

@@ -1,7 +1,7 @@
-"""Inner loops of vision, compiled by numba: what OpenCV and NumPy do not offer, or only by many calls on small arrays.
+"""Inner loops of vision, compiled by numba, which OpenCV and NumPy lack, or offer only by many calls on small arrays.
 
 A kernel is one Python function with the types of its arguments. `prepare` compiles all of them, once: numba keeps the
-machine code beside the source, or in the user's cache folder where the package cannot be written.
+machine code next to the source, or in the user's cache folder where the package cannot be written.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def prepare() -> None:
-    """Compile every imported kernel that is not yet, and say so in one line: the first time it takes up to 25 s."""
+    """Compile all imported kernels, with one line in the log: the first time it takes up to 25 s."""
     if not all(compiled.signatures or _stored(compiled) for compiled, _ in KERNELS):
         log.warning("vision is compiled, once: up to 25 s")
     for compiled, signature in KERNELS:

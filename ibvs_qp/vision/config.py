@@ -86,7 +86,7 @@ class DetectConfig(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class LineConfig(Checked):
-    """Sub-pixel refinement by profiles across the line, and what lies on its two sides."""
+    """Sub-pixel refinement by profiles across the line, and the contents of its two sides."""
 
     profiles: int = setting(64, "profiles along a line", low=16, high=400)
     strip_px: float = setting(
@@ -142,7 +142,7 @@ class FlowConfig(Checked):
     pixel_sigma: float = setting(0.04, "error of a point beyond noise, half resolution", unit="px", low=0.001, high=2.0)
     gate_sigmas: float = setting(4.0, "residuals beyond this many robust sigmas get no weight", low=2.0, high=20.0)
     min_points: int = setting(6, "fewer agreeing points give no velocity", low=3, high=100)
-    prior_m_s: float = setting(1.0, "spread assumed where nothing is seen", unit="m/s", low=0.05, high=50.0)
+    prior_m_s: float = setting(1.0, "spread assumed where nothing is visible", unit="m/s", low=0.05, high=50.0)
     rotation_sigma_rad: float = setting(
         7e-5, "error of the rotation between frames (3.4e-4 rad/s/sqrt(Hz) over 1/30 s)", unit="rad", low=0.0, high=0.1
     )

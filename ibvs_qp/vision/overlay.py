@@ -1,4 +1,4 @@
-"""A picture with what perception saw, for videos and for people."""
+"""A picture with the results of perception drawn in, for videos and for viewing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ibvs_qp.vision.picture.picture import denormalise
 _SURFACE, _MASK = (60, 220, 90), (200, 60, 60)
 _KINDS = {"board": (255, 160, 0), "paint": (255, 0, 200), "": (120, 120, 120)}
 _FAINT, _INK, _GROUND = (150, 150, 150), (255, 255, 255), (20, 20, 20)
-#: Share of a tint in the picture; length of the tick towards the surface [px]; size of the text.
+#: Weight of a tint in the picture; length of the tick towards the surface [px]; size of the text.
 _TINT, _TICK_PX, _TEXT = 0.22, 14, 0.42
 #: Font, margin of the ground around the text, and distance of a label from its line [px].
 _FONT, _PAD_PX, _CLEAR_PX = cv2.FONT_HERSHEY_SIMPLEX, 3, 10
@@ -24,8 +24,8 @@ def draw_overlay(rgb: np.ndarray, seen: PerceptionResult, *, words: bool = True,
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
-        seen: What was seen in it.
-        words: Whether to write what each track is, and distance and velocity; too small to read in print.
+        seen: Result of perception.
+        words: Whether to label each track, and write distance and velocity; too small to read in print.
         tints: Whether to tint surface and mask, which takes milliseconds.
 
     Returns:
@@ -74,7 +74,7 @@ def _draw_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> Non
 
 
 def _label_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> None:
-    """Write what a track is on the side away from the surface, where no other edge of it runs."""
+    """Label a track on the side away from the surface, where no other edge of it runs."""
     name = f" {track.hint}" if track.hint else ""
     text = f"{track.track_id} {track.kind} {track.weight:.1f}{name}"
     (width, height), _ = cv2.getTextSize(text, _FONT, _TEXT, 1)

@@ -200,16 +200,16 @@ class Perception:
         layout: PictureLayout,
         down: np.ndarray | None,
         tilt: float | None,
-        wanted: bool,
+        requested: bool,
     ) -> list[Candidate]:
-        """Search for lines when it is time to, or when wanted."""
+        """Search for lines when a search is due or requested."""
         self._since_detection += 1
         self._frames += 1
         settings = self._config.detect
         confirmed = any(track.confirmed for track in self._tracker.tracks)
-        calm = confirmed and self._frames > _WARM_UP and not wanted
+        calm = confirmed and self._frames > _WARM_UP and not requested
         period = settings.period if calm else settings.lost_period
-        if self._surface.plane is None or not (self._since_detection >= period or wanted):
+        if self._surface.plane is None or not (self._since_detection >= period or requested):
             return []
         self._since_detection = 0
         surface = self._surface.region_now(frame, layout, down)

@@ -23,7 +23,7 @@ class PerceptionResult:
         features: Lines, plane and velocity for an estimator or a controller.
         plane: The surface, or None.
         tracks: All tracks, tentative ones included.
-        guides: Track of the surface's own top, bottom, left and right edge, None where none is seen.
+        guides: Track of the surface's own top, bottom, left and right edge, None where none is in view.
         candidates: Lines found by a detection in this picture (empty where none ran).
         refused: Why there is no plane or nothing at all, or None.
         velocity_refused: Why there is no velocity, or None.

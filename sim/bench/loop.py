@@ -31,7 +31,7 @@ def bench_loop(seed: int, progress: Callable[[str], None]) -> Bench:
 
     Args:
         seed: Of both flights.
-        progress: Called with what is measured.
+        progress: Called with the name of each measurement.
 
     Returns:
         A row per stage of each flight [us per tick]; `stages_us` per flown second [us]; `ratios` are real-time factors.

@@ -28,7 +28,7 @@ from sim.bench.timing import Bench, Row
 WARM_UP = 500
 #: Back ends of qpsolvers that take dense matrices only.
 DENSE = ("daqp", "quadprog")
-#: What a row of each kind times.
+#: Timed part of a row of each kind.
 TIMED = {
     "step": "the whole tick, whose stage solve compares with the direct rows",
     "qpsolvers_NAME": "through qpsolvers: assembly of the program with scipy.sparse, then the solver",

@@ -1,4 +1,4 @@
-"""Processor time of tracked pictures, detection and velocity beside the paper's pipeline and cv2's LSD, one thread."""
+"""Processor time of tracked pictures, detection and velocity, the paper's pipeline and cv2's LSD, one thread."""
 
 from __future__ import annotations
 

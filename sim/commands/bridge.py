@@ -42,7 +42,7 @@ class BridgeCommand:
     """Print one JSON line on standard output at the end, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Fly, or print what would be done."""
+        """Run the bridge, or print its plan."""
         from ibvs_qp.bridge.config import BridgeConfig
         from sim.commands.status_lines import StatusLines
         from sim.flight.stop import handled_ctrl_c
@@ -104,7 +104,7 @@ def _fly(bridge: Bridge, duration_s: float | None, lines: StatusLines | None, in
         return not (interrupts or 0 < end_ns <= now_ns)
 
     gc.collect()
-    gc.freeze()  # what is loaded stays: the collector would visit it during the flight, for 20 ms each time
+    gc.freeze()  # loaded modules stay: the collector would visit them during the flight, for 20 ms each time
     return run(tick, 1.0 / bridge.tick_s)
 
 
@@ -130,7 +130,7 @@ def _summary(bridge: Bridge, timing: Timing | None) -> str:
 
 
 def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
-    """What the bridge reads, writes and waits for; refuses what does not fit the vehicle."""
+    """Inputs, outputs and conditions of the bridge; refuses settings that do not fit the vehicle."""
     from ibvs_qp.bridge.bridge import checks
     from ibvs_qp.bridge.dds import dds_topic, dds_type
     from ibvs_qp.bridge.inputs import subscriptions

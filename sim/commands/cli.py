@@ -25,7 +25,7 @@ from sim.flight.stop import sigterm_as_ctrl_c
 from sim.storage.limits import LONGEST_SIDE
 
 #: Environment of the libraries, read when they load. One thread each: the matrices are small, and flights run side by
-#: side as processes. OpenCV decodes no picture larger than `detect` takes, whatever a small file says.
+#: side as processes. OpenCV decodes no picture larger than `detect` takes, for any claim of a small file.
 _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",

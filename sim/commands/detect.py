@@ -53,7 +53,7 @@ class Detect:
     depth_units_per_metre: Annotated[float | None, optional("UNITS")] = None
     """Depth values per metre: 1000 for millimetres (default without --camera), 5000 for TUM, 1 for metres."""
     camera: Annotated[Path | None, optional("FILE")] = None
-    """TOML file with [camera] as of a preset: lenses, and the place of a depth camera beside the colour's."""
+    """TOML file with [camera] as of a preset: lenses, and the place of a separate depth camera."""
     distortion: Annotated[tuple[float, float, float, float, float] | None, optional("K1 K2 P1 P2 K3")] = None
     """Lens distortion in OpenCV's order; pictures are rectified, pixels stay those of the picture as taken. Default:
     that of --camera or of the bag's camera_info, else none."""

@@ -45,7 +45,7 @@ class ExportC:
         chosen = preset_file(self.preset, "--preset")
         settings = PilotConfig() if chosen is None else PilotConfig.from_toml(chosen)
         if settings.law != "qp":
-            raise ConfigError(f"law: {settings.law!r}; the library flies the quadratic program, so it must be 'qp'")
+            raise ConfigError(f"law: {settings.law!r}; the library has only the quadratic program: 'qp'")
         with working(Console(stderr=True), "Writing the library ..."):
             write_library(self.folder, settings.controller, self.float)
             write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)

@@ -1,4 +1,4 @@
-"""``ibvs-qp faults``: fly the fault matrix with and without the supervisor, judge every flight, and report."""
+"""``ibvs-qp faults``: fly the fault matrix with and without the supervisor, score every flight, and report."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Faults:
     """Print the summary as one JSON line on standard output, and nothing else."""
 
     def run(self, words: list[str]) -> int:
-        """Fly the missing flights, judge all, write table, summary and page."""
+        """Fly the missing flights, score all, write table, summary and page."""
         from importlib.metadata import version
 
         from rich.console import Console
@@ -100,7 +100,7 @@ class Faults:
                 result = run_sweep(runs, folder / PARTS, workers=workers, progress=progress)
             vehicle = pilot_of("supervised").controller.vehicle
             push_n = job_scene(choice.worlds[0]).paint.push_n
-            judged = verdicts(choice.rows, result.table, push_n, vehicle)
+            found = verdicts(choice.rows, result.table, push_n, vehicle)
             facts: dict[str, Any] = {
                 "command": command_line(words),
                 "version": version("ibvs-qp"),
@@ -110,19 +110,19 @@ class Faults:
                 "interrupted": result.interrupted,
                 "wall_time_s": time.perf_counter() - started,
             }
-            content = summary(judged, folder, facts)
+            content = summary(found, folder, facts)
             with working(notes, "Writing the page ..."):
-                file = write(folder, result.table, content, self._page(judged, choice, result.table.height))
+                file = write(folder, result.table, content, self._page(found, choice, result.table.height))
             if self.json:
                 print(as_json(content))
             else:
-                _print_verdicts(Console(), judged, choice.worlds)
+                _print_verdicts(Console(), found, choice.worlds)
                 print(f"Results: {file}")
             if result.interrupted:
                 return interrupted(words, folder, f"finished flights are in {folder}")
             return 0
 
-    def _page(self, judged: Sequence[Verdict], choice: Choice, flights: int) -> str:
+    def _page(self, found: Sequence[Verdict], choice: Choice, flights: int) -> str:
         from importlib.metadata import version
 
         from sim.fault_matrix.attainable import hovers
@@ -136,7 +136,7 @@ class Faults:
             f"{self.seed}, {version('ibvs-qp')}."
         )
         lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
-        return page(judged, left, lead, self._again(), vehicle)
+        return page(found, left, lead, self._again(), vehicle)
 
     def _again(self) -> str:
         """The command that repeats the matrix on any computer."""

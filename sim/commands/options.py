@@ -18,7 +18,7 @@ from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.world.worlds import DEFAULT_WORLD
 
 _WORLD = "World: errors of vehicle and sensors, as ideal, datasheet, harsh, or a TOML file; default: "
-#: World of the flights of a command that flies no scene file.
+#: World of the flights of a command without a scene file.
 World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{DEFAULT_WORLD}.", help_behavior_hint="")]
 #: World of a flight that may have a scene file; None takes the errors that the file sets, else the default world.
 SceneWorld = Annotated[
@@ -72,7 +72,7 @@ def scene_file(file: Path | None, option: str = "--scene") -> Path | None:
     """A scene file, or the shipped one of that name.
 
     Raises:
-        ConfigError: When there is none, or it is a preset.
+        ConfigError: When it is missing or a preset.
     """
     return _shipped_or_given(file, option, "scene")
 
@@ -86,7 +86,7 @@ def preset_file(file: Path | None, option: str = "--preset", *, other_formats: b
         other_formats: Whether the file need not be TOML.
 
     Raises:
-        ConfigError: When there is none, or it is a scene.
+        ConfigError: When it is missing or a scene.
     """
     return _shipped_or_given(file, option, "preset", other_formats)
 
@@ -112,7 +112,7 @@ def _shipped_or_given(file: Path | None, option: str, kind: str, other_formats: 
 
 
 def _kind(file: Path) -> str | None:
-    """Whether a TOML file is a scene or a preset, by its sections; None if they do not tell."""
+    """Whether a TOML file is a scene or a preset, by its sections; None if they do not show it."""
     from ibvs_qp.pilot import PilotConfig
     from sim.world.scene import Scene
 
@@ -153,7 +153,7 @@ def interrupted(words: Sequence[str], folder: Path, kept: str) -> int:
     Args:
         words: Arguments after ``ibvs-qp``.
         folder: Folder of the results.
-        kept: What the disk holds already.
+        kept: Present contents of the disk.
 
     Returns:
         The exit code.

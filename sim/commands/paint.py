@@ -78,7 +78,7 @@ class Paint:
         return dataclasses.replace(self, **self._shown())._run(words)
 
     def _shown(self) -> dict[str, bool]:
-        """`view` and `no_video` as far as this computer can; a note says what it cannot."""
+        """`view` and `no_video` as far as this computer can; a note names the missing parts."""
         from sim.flight.viewer import NoDisplay, check_display
         from sim.video.film import missing_encoder
 

@@ -21,17 +21,17 @@ NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReplayCommand:
-    """Run the recorded controller on the inputs of a log: the same commands to the bit, or where not.
+    """Run the recorded controller on the inputs of a log: bit-identical commands, or the first difference.
 
     Example: ibvs-qp replay runs/one/flight_qp.mcap --preset tarot_t960_paper
     """
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
-    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also what a killed process left."""
+    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also the log of a killed process."""
     preset: Annotated[Path | None, optional("FILE")] = None
-    """Preset file (TOML), or a shipped one: show what it would have commanded on the same inputs instead."""
+    """Preset file (TOML), or a shipped one: show its commands on the same inputs instead."""
     repair: Annotated[Path | None, optional("FILE")] = None
-    """Write the log again with its end and index, for viewers that refuse what a killed process left."""
+    """Write the log again with its end and index, for viewers that refuse the log of a killed process."""
     json: Annotated[bool, flag] = False
     """Print one JSON line on standard output, and nothing else."""
 
@@ -84,7 +84,7 @@ def _text(flight: RecordedFlight, result: Replay | PresetComparison) -> list[str
 
 def _replay_text(result: Replay) -> list[str]:
     if result.first is None:
-        return [f"Same to the bit over {result.ticks} ticks."] if result.ticks else [NOTHING]
+        return [f"Bit-identical over {result.ticks} ticks."] if result.ticks else [NOTHING]
     first = result.first
     lines = [
         f"Differs: {result.differing} of {result.ticks} ticks; first at tick {first.tick}, {_seconds(first.stamp_ns)}:"
@@ -101,7 +101,7 @@ def _preset_text(result: PresetComparison) -> list[str]:
     if not result.ticks:
         return [NOTHING]
     if result.same:
-        return [f"The preset commands the same to the bit over {result.ticks} ticks."]
+        return [f"The commands of the preset are bit-identical over {result.ticks} ticks."]
     lines = [
         f"The preset's commands on the recorded inputs, {result.ticks} ticks:",
         f"  thrusts: difference {result.thrust_rms_n:.3f} N rms, {result.thrust_peak_n:.3f} N peak at tick"
@@ -117,7 +117,7 @@ def _preset_text(result: PresetComparison) -> list[str]:
             limits.get(name, 0) / result.ticks for limits in (result.limits_recorded, result.limits_preset)
         )
         lines.append(f"  limit {name}: active in {after:.1%} of the ticks instead of {before:.1%}")
-    lines.append("Inputs are the recorded ones: what the vehicle would have done under the preset is not in them.")
+    lines.append("Inputs are the recorded ones: they lack the reaction of the vehicle to the preset.")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""Standard output of ``ibvs-qp``: no traceback for a closed, full or broken one, no foreign line beside JSON."""
+"""Standard output of ``ibvs-qp``: no traceback for a closed, full or broken one, no foreign line next to JSON."""
 
 from __future__ import annotations
 

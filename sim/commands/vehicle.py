@@ -1,4 +1,4 @@
-"""``ibvs-qp vehicle``: what the rotors of a vehicle can do, from a preset or from PX4's parameters."""
+"""``ibvs-qp vehicle``: actuation of a vehicle, from a preset or from PX4's parameters."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Vehicle:
     px4: Annotated[Path | None, optional("FILE")] = None
     """Write PX4's parameters CA_ROTORn_* to this file."""
     toml: Annotated[Path | None, optional("FILE")] = None
-    """Write the vehicle as a TOML file with [vehicle], what the file does not state as comments."""
+    """Write the vehicle as a TOML file with [vehicle], missing keys as comments."""
     picture: Annotated[Path | None, optional("FILE")] = None
     """Draw the vehicle and its picture in contact to this PNG, PDF or SVG file."""
     json: Annotated[bool, flag] = False
@@ -100,7 +100,7 @@ def read_vehicle(file: Path) -> VehicleFile:
 
 
 def vehicle_toml(given: VehicleFile) -> str:
-    """A file with [vehicle]; lines of what its source did not state are comments that say so."""
+    """A file with [vehicle]; keys that its source lacks are comments."""
     import tomli_w
 
     from ibvs_qp.config.settings import to_dict
@@ -225,7 +225,7 @@ def _finite(value: float) -> float | None:
 
 
 def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | None) -> None:
-    """Settings that follow from the vehicle, and what the file does not state."""
+    """Settings that follow from the vehicle, and the missing keys of the file."""
     from sim.evaluate.table import terminal_table
     from sim.vehicles.configuration import derived_settings
 

@@ -1,4 +1,4 @@
-"""What a detection hands out, whichever pipeline made it: lines in pixels and normalised, four guides, the plane."""
+"""Result of a detection by any pipeline: lines in pixels and normalised, four guides, the plane."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class DetectedLine:
         rho: Distance from the image centre, normalised, lens distortion removed.
         theta: Angle of the normal [rad].
         covariance: Of (rho, theta), (2, 2).
-        score: 0..1, how well it fits what is asked for; ranks lines of one picture.
-        confidence: 0..1, share of such lines that are right; 0.8 and more is sure.
+        score: 0..1, how well it fits the request; ranks lines of one picture.
+        confidence: 0..1, fraction of such lines that are right; 0.8 and more is sure.
         borders_plane: Whether the surface ends there.
         surface_side: +1 if the surface lies on the side the normal (cos, sin) points to, -1 on the other, 0 unknown.
         line_id: Identity of a track, kept from picture to picture of a followed sequence; lines without a track are
@@ -58,7 +58,7 @@ class Detection:
         plane: The surface, or None.
         refused: Why there is no surface, or None.
         candidates: Lines on or around the surface, best first.
-        guides: The surface's own top, bottom, left and right edge, None where none is seen.
+        guides: The surface's own top, bottom, left and right edge, None where none is in view.
         tracked: Whether the picture continued a sequence.
         time_ms: Wall-clock time of the detection [ms].
     """

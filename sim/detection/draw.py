@@ -11,7 +11,7 @@ from sim.detection.detection import GUIDE_SIDES, DetectedLine, Detection
 _COLORS = {"top": (255, 150, 0), "bottom": (255, 0, 200), "left": (0, 190, 255), "right": (120, 255, 0)}
 _FAINT, _SURFACE, _SEED = (200, 200, 90), (60, 220, 90), (255, 40, 40)
 _INK, _GROUND = (255, 255, 255), (20, 20, 20)
-#: Share of the tint; text size for a picture 640 wide; margin of the ground around text [px].
+#: Weight of the tint; text size for a picture 640 wide; margin of the ground around text [px].
 _TINT, _TEXT, _PAD = 0.20, 0.45, 3
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 #: Sub-pixel bits of the drawing functions.
@@ -21,11 +21,11 @@ _SURE, _DASH = 0.8, 9.0
 
 
 def draw_detection(rgb: np.ndarray, result: Detection, seed: tuple[float, float] | None = None) -> np.ndarray:
-    """Draw what was found into a copy of the picture.
+    """Draw the result into a copy of the picture.
 
     Args:
         rgb: The picture, uint8 (H, W, 3).
-        result: What was found in it.
+        result: Result of the detection.
         seed: (u, v) of the place on the surface, or None.
 
     Returns:

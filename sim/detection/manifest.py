@@ -42,7 +42,7 @@ class FrameEntry:
     """One frame."""
 
     color: str  # colour file, as in the manifest
-    depth: str  # depth file, or "" if there is none
+    depth: str  # depth file, or "" without one
     folder: Path  # folder of both
     intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
     depth_units_per_metre: float  # depth values per metre
@@ -55,7 +55,7 @@ def read_manifest(folder: Path, camera: RgbdCameraSettings | None = None) -> lis
 
     Args:
         folder: The folder.
-        camera: Settings of what no column states.
+        camera: Settings that no column states.
 
     Raises:
         ConfigError: When it is missing, lacks a column or has a value that is no number.

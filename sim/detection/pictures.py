@@ -89,14 +89,14 @@ def read_depth(file: Path, units_per_metre: float) -> np.ndarray:
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
 
 
-def _read(file: Path, what: str) -> np.ndarray:
+def _read(file: Path, kind: str) -> np.ndarray:
     """Content of a file as an array of two or three dimensions."""
     try:
         picture = _READERS.get(file.suffix.lower(), _decoded)(file)
     except UnreadableFile as error:
-        raise PictureError(f"cannot read the {what} picture {file}: {error.reason}") from None
+        raise PictureError(f"cannot read the {kind} picture {file}: {error.reason}") from None
     if picture is None or picture.ndim not in (2, 3) or min(picture.shape) < 1:
-        raise PictureError(f"cannot read the {what} picture {file}: it is no picture (PNG, JPEG, TIFF, npy, npz)")
+        raise PictureError(f"cannot read the {kind} picture {file}: it is no picture (PNG, JPEG, TIFF, npy, npz)")
     if max(picture.shape[:2]) > LONGEST_SIDE:
         raise PictureError(f"{file} is {picture.shape[1]} x {picture.shape[0]} px: at most {LONGEST_SIDE} are read")
     return picture

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.picture.camera import RgbdCamera
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
-from sim.detection.as_taken import as_taken, ideal_pixel
 from sim.detection.detection import Detection
 from sim.detection.manifest import FrameEntry, motion_sequences
 from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame
+from sim.detection.raw_pixels import ideal_pixel, raw_pixels
 
 if TYPE_CHECKING:
     from ibvs_qp.ros.bag import Bag
@@ -138,5 +138,5 @@ def _found(
         first = max((line.line_id for line in own), default=0) + 1
         more = (dataclasses.replace(line, line_id=k) for k, line in enumerate(method.every_line(picture), first))
         detection = dataclasses.replace(detection, candidates=(*own, *more))
-    detection = as_taken(detection, camera.lens, frame)
+    detection = raw_pixels(detection, camera.lens, frame)
     return FrameResult(entry=entry, frame=frame, detection=detection, time_ms=elapsed)

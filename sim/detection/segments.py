@@ -8,7 +8,7 @@ import numpy as np
 #: Shortest segment that may be joined with others, and shortest line listed [px at 640].
 _PIECE_PX, _LISTED_PX = 12.0, 20.0
 #: Two pieces are one line if they lie this near to their common line [px at 640] and their gap is at most this
-#: share of their lengths together.
+#: fraction of their lengths together.
 _APART_PX, _GAP_SHARE = 1.5, 0.5
 #: Largest angle between two pieces of one line [rad].
 _TURN = np.radians(3.0)

@@ -19,7 +19,7 @@ from sim.detection.segments import find_segments
 _STRAY_PX = 1.5
 #: Error of a segment's end across it where no fit improved it [px].
 _SEGMENT_SIGMA_PX = 0.3
-#: A line this long has the full score, share of the picture's width.
+#: A line this long has the full score, fraction of the picture's width.
 _FULL_LENGTH = 0.25
 
 

@@ -1,4 +1,4 @@
-"""Text and tables of `ibvs-qp explain`: headline, rejected inputs, tasks, limits, rotors, wrench given up."""
+"""Text and tables of `ibvs-qp explain`: headline, rejected inputs, tasks, limits, rotors, unallocated wrench."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _REGULAR = ("effort", "smooth")
 #: Headings of the table of tasks.
 TASK_HEADINGS = ("task", "unit", "target", "achieved", "residual", "weight", "cost")
 _AXES = ("front", "right", "down", "roll", "pitch", "yaw")
-#: Components of the wrench given up below this are not listed [N, N m].
+#: Components of the unallocated wrench below this are not listed [N, N m].
 _NOTHING = 5e-4
 #: A commanded push that is lower than the job's by more than this is explained [N].
 _REDUCED_N = 1e-3
@@ -46,13 +46,13 @@ def explanation_tables(
     """Strings and tables for a console: a solved tick, one with conflicting hard limits, or a hold with neither."""
     rotors = _rotors(trace, tick, config, explanation, bool(explanation or conflict))
     if explanation is not None:
-        parts = [_tasks(explanation), *_limits(explanation), rotors, _given_up(explanation.unallocated_wrench)]
+        parts = [_tasks(explanation), *_limits(explanation), rotors, _unallocated(explanation.unallocated_wrench)]
     elif conflict:
-        parts = [*_conflict(conflict), rotors, _given_up(trace.unallocated[tick])]
+        parts = [*_conflict(conflict), rotors, _unallocated(trace.unallocated[tick])]
     else:
         parts = [
             "Outcome hold: no program was solved; the thrusts carry the weight and level the vehicle by IMU data.",
-            *(rotors, _given_up(trace.unallocated[tick])),
+            *(rotors, _unallocated(trace.unallocated[tick])),
         ]
     return [*_headline(trace, tick, config), *parts, _loop_margin(config)]
 
@@ -145,7 +145,7 @@ def _limits(explanation: Explanation) -> list[Any]:
 def _conflict(conflict: tuple[LimitValue, ...]) -> list[Any]:
     words = (
         f"[bold]No thrusts satisfy these {len(conflict)} hard limits together[/]; without any one of them a solution "
-        "exists. The vehicle flew the analytic law, clipped to the rotors' limits."
+        "exists. The analytic law had control, clipped to the rotors' limits."
     )
     rows = []
     for row in conflict:
@@ -178,12 +178,12 @@ def _loop_margin(config: PilotConfig) -> str:
     )
 
 
-def _given_up(wrench: np.ndarray) -> str:
+def _unallocated(wrench: np.ndarray) -> str:
     units = ("N",) * 3 + ("N m",) * 3
     lost = [entry for entry in zip(_AXES, wrench.tolist(), units, strict=True) if abs(entry[1]) >= _NOTHING]
     if not lost:
-        return "No wrench was given up."
-    return "Wrench given up because of limits: " + ", ".join(
+        return "The whole wrench is allocated."
+    return "Wrench that the limits leave unallocated: " + ", ".join(
         f"{name} {value:+.3f} {unit}" for name, value, unit in lost
     )
 

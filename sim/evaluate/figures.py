@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Least difference that matters in practice, by reported unit, and why. A smaller one does not matter, however certain.
 MATTERS = {
-    "mm": (0.5, "a sixteenth of the overlap of two rows, 8 mm; below what paint shows"),
+    "mm": (0.5, "a sixteenth of the overlap of two rows, 8 mm; not visible in paint"),
     "N": (0.05, "1 % of the commanded 5 N, and the bias of the force/torque sensor"),
     "deg": (0.1, "moves the tip, 0.7 m ahead of the centre of mass, by 1.2 mm"),
     "s": (0.1, "three pictures"),
@@ -37,7 +37,7 @@ MATTERS = {
 MORE, LESS, NEITHER = 1, -1, 0
 #: A job is reduced if it flew less than this fraction of the push that was asked.
 REDUCED = 0.95
-#: Kind of the event that says why the push was lowered, and the reason without one.
+#: Kind of the event with the reason why the push was lowered, and the reason without one.
 PUSH_REDUCED, NOT_REACHED = "push reduced", "the push was not reached"
 
 
@@ -75,7 +75,7 @@ class Figure:
         return self.matters or MATTERS[self.unit]
 
     def values(self, table: pl.DataFrame) -> np.ndarray:
-        """Figure of every row of a table in the reported unit, NaN where there is none, (rows,)."""
+        """Figure of every row of a table in the reported unit, NaN without one, (rows,)."""
         import polars as pl
 
         return self.scale * table[self.name].cast(pl.Float64).fill_null(math.nan).to_numpy()
@@ -159,8 +159,8 @@ _FIGURES = (
         lambda p: p.claimed, better=NEITHER,
     ),
     Figure(
-        "not_completed", "not completed because", "What the job lacks; a dash if nothing.",
-        lambda p: p.not_completed, better=NEITHER, exactly="what `completed` lacks by the truth; null if nothing",
+        "not_completed", "not completed because", "Missing condition of the job; a dash if none.",
+        lambda p: p.not_completed, better=NEITHER, exactly="missing condition of `completed`, by the truth; or null",
     ),
     Figure("reason", "ended because", "Why the flight ended.", lambda p: p.reason, better=NEITHER),
     Figure(
@@ -199,13 +199,14 @@ _FIGURES = (
         exactly="least overlap of a stroke's band with that of the stroke before, without the last 2 cm; < 0 is a gap",
     ),
     Figure(
-        "coverage", "coverage of the intended band", "Share of the wanted stripes with paint on it; good: near 100 %.",
+        "coverage", "coverage of the intended band",
+        "Fraction of the intended stripes with paint on it; good: near 100 %.",
         lambda p: p.coverage, "%", 100.0, digits=1, better=MORE, in_rows=True,
         exactly="painted fraction of the intended band, along the polyline of the *scene*",
     ),
     Figure(
         "off_board_share", "painting beyond the board",
-        "Share of the painting time with the tip off the board; good: 0.",
+        "Fraction of the painting time with the tip off the board; good: 0.",
         lambda p: p.off_board_share, "%", 100.0,
         exactly="fraction of painting time with the true tip beyond an edge of the board",
     ),
@@ -281,7 +282,7 @@ _FIGURES = (
     ),
     Figure(
         "contact_share", "contact while painting",
-        "Share of the painting time in which the brush touched the wall; good: 100 %.",
+        "Fraction of the painting time in which the brush touched the wall; good: 100 %.",
         lambda p: p.contact_share, "%", 100.0, better=MORE, in_rows=True,
         exactly="fraction of 1 kHz samples with more than 0.05 N while painting",
     ),
@@ -343,11 +344,11 @@ _FIGURES = (
     Figure("outcomes", "outcomes", "Ticks by outcome of the controller.", _outcomes, better=NEITHER, shown=False),
     Figure("limits", "limits", "Fraction of ticks with each limit active.", _limits, better=NEITHER, shown=False),
     Figure(
-        "solved_share", "ticks solved", "Share of ticks in which the solver reached its accuracy.",
+        "solved_share", "ticks solved", "Fraction of ticks in which the solver reached its accuracy.",
         _solved, "%", 100.0, better=MORE, shown=False, of_row=False,
     ),
     Figure(
-        "limited_share", "limited ticks", "Share of ticks with an active limit.",
+        "limited_share", "limited ticks", "Fraction of ticks with an active limit.",
         lambda p: limited_fraction(p.trace, p.ticks), "%", 100.0, better=NEITHER, shown=False, of_row=False,
     ),
     Figure(
@@ -395,12 +396,12 @@ _FIGURES = (
         unit="N", better=NEITHER,
     ),
     Figure(
-        "delivered_share", "delivered share of the push",
+        "delivered_share", "delivered fraction of the push",
         "Mean push over the push of the job.", unit="%", scale=100.0, digits=1, better=MORE,
     ),
     Figure("reach_n", "reach", "Largest push that the true limits of the rotors can hold.", unit="N", better=NEITHER),
     Figure(
-        "reach_share", "delivered share of the reach",
+        "reach_share", "delivered fraction of the reach",
         "Mean push over the lesser of reach and push of the job.", unit="%", scale=100.0, digits=1, better=MORE,
     ),
     Figure(
@@ -453,7 +454,7 @@ FIGURES = {figure.name: figure for figure in _FIGURES}
 
 
 def figure_of(name: str) -> Figure:
-    """The figure of a name; a column that is none of them has its own name and no unit."""
+    """The figure of a name; any other column has its own name and no unit."""
     return FIGURES.get(name, Figure(name, name, better=NEITHER))
 
 

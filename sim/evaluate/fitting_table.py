@@ -74,7 +74,7 @@ def _taken(widths: Sequence[int]) -> int:
 
 
 def _shrink(widths: Sequence[_Width], room: int) -> None:
-    """Take from the widest columns what the room lacks; the first column of a later part keeps its width."""
+    """Shorten the widest columns to the room; the first column of a later part keeps its width."""
     for _ in range(_taken([width.now for width in widths]) - room):
         loose = [width for width in widths if width.now > width.least]
         if not loose:

@@ -2,7 +2,7 @@
 
 Plans are in board coordinates (along, up) [m] of `BoardGeometry` and computed in pattern coordinates (u, v). Stroke 1
 runs parallel to its board edge, the first climb parallel to the edge at which stroke 1 ends, and stroke k follows the
-outer edge of stroke k - 1 as it was painted. Strokes are called rows, whatever their direction.
+outer edge of stroke k - 1 as it was painted. Strokes of any direction are called rows.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the figures of a flight, or of one of its rows, are computed from."""
+"""Data for the figures of a flight, or of one of its rows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from sim.evaluate.paint_plan import PaintPlan, Segment, band_mask, nominal_plan
 from sim.evaluate.path_error import PathError, path_error
 from sim.evaluate.strokes import Stroke, contact_share, on_board
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.evaluate.window import SETTLED_S, board_tip, contact_clock, in_phase, physics_ticks, tilt_deg, touch_figures
 from sim.flight.trace import PAINTED, Trace
 from sim.world.board import BoardGeometry
@@ -23,7 +23,7 @@ class Part:
 
     trace: Trace
     path: PathError
-    judgement: Judgement
+    assessment: Assessment
     ticks: np.ndarray  # control ticks of the part, (N,) bool
     row: int = 0  # number of the row; 0 for a whole flight
 
@@ -31,7 +31,7 @@ class Part:
     def whole(cls, trace: Trace) -> Part:
         """The whole flight."""
         ticks = np.ones(len(trace.t), bool)
-        return cls(trace=trace, path=path_error(trace), judgement=Judgement(trace), ticks=ticks)
+        return cls(trace=trace, path=path_error(trace), assessment=Assessment(trace), ticks=ticks)
 
     def rows(self) -> list[Part]:
         """The rows flown."""
@@ -39,7 +39,7 @@ class Part:
         for row in range(1, self.stroke_count + 1):
             ticks = (self.path.painting | in_phase(self.trace, "retouch")) & (self.trace.row == row)
             if ticks.any():
-                found.append(Part(trace=self.trace, path=self.path, judgement=self.judgement, ticks=ticks, row=row))
+                found.append(Part(trace=self.trace, path=self.path, assessment=self.assessment, ticks=ticks, row=row))
         return found
 
     # ------------------------------------------------------------------ ticks
@@ -113,7 +113,7 @@ class Part:
     @cached_property
     def strokes(self) -> dict[int, Stroke]:
         """Painted strokes of the part by number."""
-        return {number: each for number, each in self.judgement.strokes.items() if self.row in (0, number)}
+        return {number: each for number, each in self.assessment.strokes.items() if self.row in (0, number)}
 
     @cached_property
     def stroke_count(self) -> int:
@@ -166,8 +166,8 @@ class Part:
 
     @property
     def not_completed(self) -> str | None:
-        """What the job, or this row of it, lacks by the truth."""
-        return self.judgement.of_stroke(self.row) if self.row else self.judgement.shortfall
+        """Missing condition of the job, or of this row of it, by the truth."""
+        return self.assessment.of_stroke(self.row) if self.row else self.assessment.shortfall
 
     @property
     def duration_s(self) -> float:

@@ -1,8 +1,8 @@
 """Painted strokes against their nominal lines, in pattern coordinates (u, v) [m] of `ibvs_qp.painting.pattern`.
 
-Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, whatever the strokes
-before it did. A stroke's line is the mean of its tip path over pieces along u, of what lies on the board in contact;
-its band is what a round brush covers along this line and the line along which it was painted again.
+Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, independent of the
+strokes before it. A stroke's line is the mean of its tip path over pieces along u, of the part on the board in contact;
+its band is the cover of a round brush along this line and the line along which it was painted again.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ TICKS_S = 0.02
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Assessment:
     """A flight against its job.
 
     Args:
@@ -52,7 +52,7 @@ class Judgement:
 
     @cached_property
     def shortfall(self) -> str | None:
-        """What the job lacks, named by stroke or phase; None for a completed one."""
+        """Missing condition of the job, named by stroke or phase; None for a completed one."""
         if self.trace.legs is not None:
             job = self._legs(self.trace.legs)
         else:
@@ -73,7 +73,7 @@ class Judgement:
         return ROUGH_CONTACT if rough else CONTACT
 
     def of_stroke(self, number: int) -> str | None:
-        """What a stroke lacks; None for a good one."""
+        """Missing condition of a stroke; None for a good one."""
         return "; ".join(self._stroke(number)) or None
 
     @property
@@ -82,7 +82,7 @@ class Judgement:
         return self.trace.scene.paint.pattern.removesuffix("s")
 
     def _ends(self) -> Iterator[str]:
-        """Ends of a flight that complete no job, whatever came before."""
+        """Ends of a flight that complete no job, after any course."""
         reason = self.trace.reason
         if any(reason.startswith(end) for end in (CRASH, INTERRUPTED, KILLED)) or TIME_OUT in reason:
             yield reason
@@ -100,7 +100,7 @@ class Judgement:
             yield f"contact in {100.0 * share:.1f} % of painting, {100.0 * self.least_contact:g} % needed"
 
     def _legs(self, legs: Sequence[tuple[float, float]]) -> Iterator[str]:
-        """Legs of a strategy of the user's by the way of the tip in contact; without legs only its claim can tell."""
+        """Legs of a strategy of the user's by the way of the tip in contact; without legs only its claim counts."""
         if not legs and not self.trace.claimed:
             yield self.trace.reason
         for number, (right, down) in enumerate(legs, start=1):
@@ -120,7 +120,7 @@ class Judgement:
         if abs(flown[-1] - length) > LENGTH_M:
             return f"{flown[-1]:.3f} m long, {length:.3f} m asked"
         if abs(aside[-1]) > LENGTH_M:
-            return f"it ends {_mm(abs(aside[-1]))} beside its line"
+            return f"it ends {_mm(abs(aside[-1]))} from its line"
         stray = float(np.abs(aside - aside.mean()).max())
         return f"{_mm(stray)} from its mean line" if stray > PLACE_M else ""
 
@@ -175,11 +175,11 @@ class Judgement:
         if way < least:
             yield f"slid {_mm(way)}, at least {_mm(least)} needed"
 
-    def _descended(self, lasted: float, what: str = "held") -> Iterator[str]:
+    def _descended(self, lasted: float, action: str = "held") -> Iterator[str]:
         """A press that a fault ended: the plan is then to leave the wall and to land, or to descend for a time."""
         trace = self.trace
         if not any(event.kind == "fault" for event in trace.events):
-            yield f"{what} for {lasted:.1f} s, {trace.plan['press' if what == 'held' else 'paint']:g} s asked"
+            yield f"{action} for {lasted:.1f} s, {trace.plan['press' if action == 'held' else 'paint']:g} s asked"
             return
         leaving = np.flatnonzero(in_phase(trace, "retreat"))
         descended = float(trace.t[-1] - trace.t[leaving[0]]) if len(leaving) else 0.0

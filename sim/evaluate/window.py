@@ -84,12 +84,12 @@ def phase_window(trace: Trace, phase: str) -> tuple[float, float]:
 
 
 def event_time(trace: Trace, kind: str) -> float:
-    """Time of the first event of a kind [s]; NaN if there is none."""
+    """Time of the first event of a kind [s]; NaN without one."""
     return next((event.t for event in trace.events if event.kind == kind), math.nan)
 
 
 def last_event(trace: Trace, kind: str) -> str | None:
-    """Text of the last event of a kind; None if there is none."""
+    """Text of the last event of a kind; None without one."""
     return next((event.text for event in reversed(trace.events) if event.kind == kind), None)
 
 

@@ -43,7 +43,7 @@ class Comparison:
 
 
 def _bare(variant: Variant) -> Variant:
-    """A variant without its allocator and words, to compare what else it switches."""
+    """A variant without its allocator and words, to compare its other switches."""
     switches = {name: value for name, value in variant.switches.items() if name != "allocator"}
     return dataclasses.replace(variant, words="", switches=switches, laws=(), against=())
 
@@ -65,7 +65,7 @@ def rivals(rows: pl.DataFrame, variant: str) -> dict[str, pl.DataFrame]:
 
 
 def best_allocator(flown: dict[str, pl.DataFrame], column: Column) -> str:
-    """The allocator with the largest share of flights that ended as planned, then with the best median."""
+    """The allocator with the largest fraction of flights that ended as planned, then with the best median."""
 
     def rank(name: str) -> tuple[float, float]:
         values = completed(flown[name], column.metric) if column.metric in flown[name].columns else np.zeros(0)
@@ -88,7 +88,7 @@ def compared_cells(
 
 
 def comparisons(experiment: Experiment, table: pl.DataFrame) -> list[Comparison]:
-    """Every metric with a direction in every cell that both laws flew, against every allocator."""
+    """Every metric with a direction in every cell with flights of both laws, against every allocator."""
     columns = [column for column in measured(experiment, table) if column.better]
     result = []
     for variant, params, qp, flown in compared_cells(experiment, table):

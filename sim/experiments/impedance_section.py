@@ -52,14 +52,14 @@ def impedance_section(experiment: Experiment, table: pl.DataFrame) -> str:
     stability, worse_beyond = _stability(table)
     steadier = effects[Effect.SECOND] > 0 and not effects[Effect.FIRST]
     mechanism = f" {_MECHANISM}" if steadier and worse_beyond else ""
-    return f"{_said(effects)} {stability}{mechanism}\n\n{column.label.capitalize()}:\n\n{capped(heads, rows)}"
+    return f"{_described(effects)} {stability}{mechanism}\n\n{column.label.capitalize()}:\n\n{capped(heads, rows)}"
 
 
 def _median(rows: pl.DataFrame, column: Column) -> str:
     return rounded(column.scale * median_interval(completed(rows, _METRIC))["median"], column.digits)
 
 
-def _said(effects: Counter[Effect]) -> str:
+def _described(effects: Counter[Effect]) -> str:
     """The verdict in words."""
     cells, direct, impedance = sum(effects.values()), effects[Effect.SECOND], effects[Effect.FIRST]
     if cells == effects[Effect.FEW]:

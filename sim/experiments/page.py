@@ -19,16 +19,16 @@ _OVERVIEW = "worlds"
 
 
 def _claims(tables: Sequence[pl.DataFrame]) -> str:
-    """How many flights were judged by the truth, and how many of them the pilot claims wrongly."""
-    judged = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
+    """How many flights were checked by the truth, and how many of them the pilot claims wrongly."""
+    checked = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
     text = ""
-    if judged:
+    if checked:
         claims = sum(map(false_claims, tables))
-        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {judged} flights.\n"
-    if older := sum(map(len, tables)) - judged:
+        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {checked} flights.\n"
+    if older := sum(map(len, tables)) - checked:
         text += (
-            f"{older} flights are older than the judgement by the truth: they *ended as planned* by the pilot's claim "
-            "([experiments](../experiments.md) has them judged again by their figures).\n"
+            f"{older} flights are older than the assessment by the truth: they *ended as planned* by the pilot's claim "
+            "([experiments](../experiments.md) has them scored again by their figures).\n"
         )
     return text
 
@@ -38,9 +38,9 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
 
     Args:
         sections: The flown experiments.
-        lead: A sentence on what was flown.
+        lead: A sentence on the flights.
         command: Command that repeats one experiment, with ``{name}`` in the place of its name.
-        name: What was flown: an experiment, or "all".
+        name: Of the flights: an experiment, or "all".
     """
     flown = [(section.experiment, section.table) for section in sections]
     text = (
@@ -56,12 +56,12 @@ def results_page(sections: Sequence[Section], lead: str, command: str, name: str
     for caption, file in overview[:1]:
         text += f"\n![{caption}]({file.as_posix()})\n\n*{caption}.*\n"
     chapters = {
-        "What weights and a horizon of one tick cost": rivals_section(flown),
+        "Cost of weights and of a horizon of one tick": rivals_section(flown),
         "Bounds": criteria_section(flown),
         "Impedance against direct force control": "".join(
             impedance_section(experiment, table) for experiment, table in flown if experiment.name == "force-hold"
         ),
-        "What each part is worth": parts_section(flown),
+        "Benefit of each part": parts_section(flown),
         "Published flights and rates": "\n".join(filter(None, (published_section(flown), rates_section(flown)))),
     }
     return text + "".join(f"\n## {title}\n\n{chapter}" for title, chapter in chapters.items() if chapter)

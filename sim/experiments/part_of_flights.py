@@ -34,20 +34,20 @@ def parse_part(parser: argparse.ArgumentParser) -> argparse.Namespace:
 
 
 def fly_part(
-    runs: Sequence[Run], wanted: Sequence[Run], given: argparse.Namespace, words: str
+    runs: Sequence[Run], chosen: Sequence[Run], given: argparse.Namespace, words: str
 ) -> tuple[pl.DataFrame, bool]:
-    """Fly the part of the wanted flights that the folder lacks.
+    """Fly the part of the chosen flights that is missing in the folder.
 
     Args:
         runs: Flights of the table.
-        wanted: Those of them to fly, of which the part is taken.
+        chosen: Those of them to fly, of which the part is taken.
         given: Of `parse_part`.
-        words: What flies, for the progress bar.
+        words: Name of the flights, for the progress bar.
 
     Returns:
-        Table of all flights in the folder that today's code flew, and whether the user stopped them.
+        Table of all flights in the folder with the present code, and whether the user stopped them.
     """
-    part = wanted[given.part - 1 :: given.of] if given.part else []
+    part = chosen[given.part - 1 :: given.of] if given.part else []
     with sweep_progress(Console(), words) as progress:
         result = run_sweep(part, given.out, workers=given.jobs, progress=progress)
     files = [part_file(given.out, listed_block([run]).name) for run in runs]

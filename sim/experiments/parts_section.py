@@ -1,4 +1,4 @@
-"""What each part of the controller is worth: variants against the variant that has the part, seed by seed."""
+"""Benefit of each part of the controller: variants against the variant that has the part, seed by seed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def parts_section(flown: Flown) -> str:
 
     Allocators belong to the verdict; direct force control and rivals have sections of their own.
     """
-    rows, said = [], set()
+    rows, explained = [], set()
     entries = _entries(flown, _is_part)
     groups = grouped(
         entries, lambda each: (each[2]["variant"], each[0].name, world_of(each[2]["params"]), each[2]["law"])
@@ -38,8 +38,8 @@ def parts_section(flown: Flown) -> str:
         count = Counter(outcome for outcome, *_ in found)
         flights = sum(entry["flown"] for *_, entry in own)
         reference, failed = (sum(entry["failed"][index] for *_, entry in own) for index in (0, 1))
-        words = f"*{variant}*" + (f": {VARIANTS[variant].words}" if variant not in said else "")
-        said.add(variant)
+        words = f"*{variant}*" + (f": {VARIANTS[variant].words}" if variant not in explained else "")
+        explained.add(variant)
         done = f"{flights - failed} and {flights - reference} of {flights}"
         numbers = (
             str(count[each]) for each in (Effect.FIRST, Effect.SECOND, Effect.IRRELEVANT, Effect.OPEN, Effect.FEW)

@@ -42,7 +42,7 @@ def paint_runs(
         seeds: Seeds to fly.
         features: "rendered" or "geometric".
         measure: Figures of a flight.
-        overhead_s: Start, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+        overhead_s: Start, approaches and retreats in addition to the strokes [s]; sizes the progress bar only.
         job: Job at the wall; default: paint.
         options: Further `FlightOptions`.
         cell: ``experiment``, ``variant`` and ``params`` of the runs.

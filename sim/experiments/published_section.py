@@ -1,4 +1,4 @@
-"""Published flights and rates of others beside the figures of the worlds that have the errors of a real vehicle."""
+"""Published flights and rates of others with the figures of the worlds with the errors of a real vehicle."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from sim.experiments.sections import Flown, world_of
 from sim.experiments.wording import interval
 from sim.sweep.statistics import completed, median_interval, select
 
-#: Worlds whose figures stand beside real flights; those without errors would mislead.
+#: Worlds whose figures are compared with real flights; those without errors would mislead.
 _REALISTIC = ("datasheet", "harsh")
 #: Metrics that were published.
 _METRICS = ("path_rms_straight_m", "force_rms_straight_n")
-#: Flights of others: what flew, path, push.
+#: Flights of others: vehicle, path, push.
 _FLIGHTS = (
     ("real flight, another vehicle of this class: Guo, He et al., *Flying Calligrapher*, RA-L 2024", "29 mm", "0.7 N"),
     ("real flight, quadrotor with a delta arm and motion capture: Tzoumanikas et al., RSS 2020", "millimetres", "–"),
@@ -44,13 +44,13 @@ def published_section(flown: Flown) -> str:
         return ""
     rows += [[*flight, "–"] for flight in _FLIGHTS]
     return (
-        "Real flights with other vehicles, walls and jobs, beside simulated ones: they show the size of errors in "
+        "Real flights with other vehicles, walls and jobs, next to simulated ones: they show the size of errors in "
         "practice, not who is better.\n\n" + markdown(("flight", "path, rms", "push error, rms", "flights done"), rows)
     )
 
 
 def rates_section(flown: Flown) -> str:
-    """Rates of perception beside the paper's line detection; empty without a flight that timed it."""
+    """Rates of perception and of the paper's line detection; empty without a flight that timed it."""
     rates = {
         variant: float(np.median(np.concatenate(values)))
         for variant in ("standard", _PAPER_VISION)

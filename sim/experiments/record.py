@@ -40,7 +40,7 @@ def data_file(folder: Path, name: str) -> Path:
 def summary(
     name: str, experiments: Sequence[Experiment], table: pl.DataFrame, folder: Path, facts: dict[str, Any]
 ) -> dict[str, Any]:
-    """The JSON of the contract, with paired differences and verdicts beside the cells.
+    """The JSON of the contract, with paired differences and verdicts in addition to the cells.
 
     Args:
         name: Experiment, or "all".
@@ -120,9 +120,9 @@ def write_page(
         folder: Folder of the page, with logs in its ``parts``.
         experiments: The flown experiments.
         table: Their rows.
-        lead: A sentence on what was flown.
+        lead: A sentence on the flights.
         command: Command that repeats one experiment, with ``{name}`` in the place of its name.
-        name: What was flown: an experiment, or "all".
+        name: Of the flights: an experiment, or "all".
     """
     sections = []
     with styled():

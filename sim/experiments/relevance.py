@@ -1,4 +1,4 @@
-"""What a paired difference means: better, worse, practically irrelevant, or not decided by the data."""
+"""Meaning of a paired difference: better, worse, practically irrelevant, or not decided by the data."""
 
 from __future__ import annotations
 

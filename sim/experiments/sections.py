@@ -1,4 +1,4 @@
-"""What the sections of the results page share: capped tables, groups, and headings of the effects."""
+"""Common parts of the sections of the results page: capped tables, groups, and headings of the effects."""
 
 from __future__ import annotations
 

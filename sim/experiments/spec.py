@@ -1,4 +1,4 @@
-"""One experiment as data: what is flown, the columns of its table, criteria of the QP law, and figures.
+"""One experiment as data: its flights, the columns of its table, criteria of the QP law, and figures.
 
 Each experiment is one file ``specs/NAME.toml``. Unknown keys and wrong types are errors.
 """
@@ -20,7 +20,7 @@ SPECS = Path(__file__).with_name("specs")
 #: Value of a dotted path of scene, pilot or job; integers stay integers.
 Value = int | float | bool | str | tuple[float, ...]
 
-#: Of a column: as its figure says.
+#: Of a column: as for its figure.
 OF_FIGURE = 99
 
 
@@ -36,7 +36,7 @@ class Column:
     where: dict[str, Parameter] = field(default_factory=dict)  # cells with this metric; empty means all
 
     def __post_init__(self) -> None:
-        """Fill in what the figure says."""
+        """Fill in the values of the figure."""
         figure = figure_of(self.metric)
         filled = {"label": self.label or figure.words, "digits": figure.digits, "better": figure.better}
         for name, value in filled.items():
@@ -60,16 +60,16 @@ class Flights:
 
     measure: str = choice(
         "press",
-        "what is measured; paint paints, paint_timed also times perception, the others press",
+        "measured job; paint paints, paint_timed also times perception, the others press",
         ("paint", "paint_timed", "press", "slide", "loss"),
     )
     seeds: int = setting(1, "flights of each cell and law", low=1)
     levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # first slowest; also variant, world
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths, as in ibvs-qp sweep
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # further paths that take a parameter's value
-    laws: tuple[str, ...] = ()  # laws that fly; empty means those of the variant
+    laws: tuple[str, ...] = ()  # laws of the flights; empty means those of the variant
     scene: str = choice("default", "scene; random is one per seed, the same under every law", ("default", "random"))
-    fault: str = choice("none", "what goes wrong after touch", ("none", "derate", "wind step"))
+    fault: str = choice("none", "fault after touch", ("none", "derate", "wind step"))
     fault_delay_s: float = setting(0.0, "time from touch to the fault", unit="s", low=0.0)
     features: str = choice("", "overrides the command line", ("", "rendered", "geometric"))
     supervised: bool = False  # whether the supervisor flies along: a lost rotor is its case
@@ -128,8 +128,8 @@ class Experiment:
 
     name: str  # as on the command line
     title: str  # heading of its section
-    about: str  # what is flown and measured
-    published: str  # what the paper, or other publications, report
+    about: str  # flights and measurements
+    published: str  # figures of the paper, or of other publications
     params: dict[str, str]  # parameters of its cells and their headings
     columns: tuple[Column, ...]
     criteria: tuple[Criteria, ...]

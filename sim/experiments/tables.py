@@ -25,9 +25,9 @@ _HEAD = """# Tables behind the results
 Generated from data by `{command}`; do not edit. {lead} [results.md](results.md) is the summary,
 [experiments.md](../experiments.md) describes the experiments.
 
-*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, one marked with a share to that share of
-them, any other bound to the median of the cell; if not all flights are within the bound, the number within it follows.
-A flight without the metric fails.
+*Met*: a bound marked *every* (flags, peaks, bounces) applies to each flight, one marked with a fraction to that
+fraction of them, any other bound to the median of the cell; if not all flights are within the bound, the number within
+it follows. A flight without the metric fails.
 Values are medians over the flights of a cell, with their 95 % bootstrap interval in brackets; of fewer than {needed}
 flights with their minimum and maximum, named so. Bars in figures are the same. *Done* counts the flights that ended as
 planned, by the truth and by the pilot's claim; values come from those flights only. Differences are taken between

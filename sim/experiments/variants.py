@@ -21,7 +21,7 @@ GYRO_ITSELF = AngularRateSettings(gyro_bandwidth_hz=1000.0, lead_s=0.0)
 class Variant:
     """A named change of the controller; ``variants.toml`` lists them."""
 
-    words: str  # what differs, for tables
+    words: str  # differences, for tables
     switches: dict[str, bool | str] = field(default_factory=dict)  # fields of ControllerConfig
     gains: dict[str, float] = field(default_factory=dict)  # gains that differ
     gains_of: str = ""  # law whose shipped gains it flies; empty for its own

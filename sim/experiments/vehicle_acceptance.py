@@ -19,7 +19,7 @@ from sim.vehicles.generator import random_vehicle
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
 
-#: Share of the vehicles with reach and brush that are to be accepted, and of their flights that are to complete [-].
+#: Fraction of the vehicles with reach and brush that are to be accepted, and of their flights that are to complete [-].
 ACCEPTED_GOAL, COMPLETED_GOAL = 0.9, 0.95
 #: Push of the job [N].
 PUSH_N = 5.0
@@ -61,7 +61,7 @@ def completes(vehicle: VehicleParams, law: str, seed: int, features: str = "geom
 
 def main() -> int:
     """Command line; exit code 1 when a goal is missed."""
-    parser = argparse.ArgumentParser(description="Accepted and flown shares of vehicles drawn at random.")
+    parser = argparse.ArgumentParser(description="Fractions of accepted and flown vehicles drawn at random.")
     parser.add_argument("--vehicles", type=int, default=10, help="candidates")
     parser.add_argument("--first", type=int, default=0, help="seed of the first vehicle")
     parser.add_argument("--flights", type=int, default=10, help="accepted vehicles to fly, under each law")

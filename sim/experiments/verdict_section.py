@@ -51,7 +51,7 @@ def _headline(best: Sequence[Comparison]) -> str:
 
 
 def _method(best: Sequence[Comparison]) -> str:
-    """How a comparison is made and what its outcomes mean, with the thresholds of the figures compared."""
+    """Method of a comparison and meaning of its outcomes, with the thresholds of the figures compared."""
     units = {each.column.unit for each in best}
     least = "; ".join(f"{amount:g} {unit}: {reason}" for unit, (amount, reason) in MATTERS.items() if unit in units)
     enough = sum(each.effect != Effect.FEW for each in best)

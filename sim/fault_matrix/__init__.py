@@ -1,1 +1,1 @@
-"""The fault matrix: every fault in contact and free, with and without the supervisor, judged and reported."""
+"""The fault matrix: every fault in contact and free, with and without the supervisor, scored and reported."""

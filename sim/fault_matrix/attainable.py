@@ -23,7 +23,7 @@ from sim.world.true_vehicle import TrueVehicle, true_vehicle
 
 @dataclass(frozen=True, kw_only=True)
 class Hover:
-    """Least tilt of a hover after a fault [deg], over all rotors that it may hit; inf where there is none."""
+    """Least tilt of a hover after a fault [deg], over all rotors that it may hit; inf without one."""
 
     row: str
     world: str
@@ -31,22 +31,22 @@ class Hover:
     heading: float  # it must not
 
 
-def hovers(rows: Sequence[Scenario], scenes: dict[str, Scene], believed: VehicleParams) -> list[Hover]:
+def hovers(rows: Sequence[Scenario], scenes: dict[str, Scene], nominal: VehicleParams) -> list[Hover]:
     """The hover that is left by every row with a fault of rotors.
 
     Args:
         rows: Rows of the matrix.
         scenes: Scene of every world, by name.
-        believed: Vehicle of the controller.
+        nominal: Vehicle of the controller.
     """
-    facets, names, found = WrenchFacets(believed.geometry), believed.geometry.names, []
+    facets, names, found = WrenchFacets(nominal.geometry), nominal.geometry.names, []
     for row in rows:
         if not all(isinstance(fault, RotorFault) for fault in row.faults):
             continue
         place = next(iter(row.places))
         hit = {row.flown(place, seed, names) for seed in range(len(names))}
         for world, scene in scenes.items():
-            vehicle = true_vehicle(scene, believed)
+            vehicle = true_vehicle(scene, nominal)
             tilts = [_tilts(facets, vehicle, scene.errors.rotors, faults) for faults in hit]
             turning, heading = (max(values) for values in zip(*tilts, strict=True))
             found.append(Hover(row=row.name, world=world, turning=turning, heading=heading))

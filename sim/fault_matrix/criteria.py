@@ -1,4 +1,4 @@
-"""What a flight with a fault must show; pure functions of its figures (`sim.evaluate.measures.fault`)."""
+"""Criteria of a flight with a fault; pure functions of its figures (`sim.evaluate.measures.fault`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PUSH_RATIO, PUSH_N = 2.5, 12.0
 SPEED_M_S = 1.0
 #: Time from the latest begin of a retreat to the last contact [s]: the brush leaves the wall at 0.1 m/s from 3 mm.
 LEAVE_S = 1.0
-#: A vehicle that must retreat may advance no farther than this [m]: a stand-off, and what it flies until then.
+#: A vehicle that must retreat may advance no farther than this [m]: a stand-off, and its way until then.
 ADVANCE_M = 0.2
 #: Rounding of thrusts [N], and of their rate [N/s].
 THRUST_ROUNDING_N, RATE_ROUNDING_N_S = 1e-6, 1e-2
@@ -58,7 +58,7 @@ def broken(
     Args:
         flown: The flight.
         row: Its row of the matrix.
-        expected: What must happen at its place.
+        expected: Expectation at its place.
         push_n: Push of the job [N].
         vehicle: Limits of the thrusts.
     """
@@ -67,7 +67,7 @@ def broken(
     if flown["struck"] != 1.0:
         return (Broken("no fault", f"the fault did not occur ({flown.reason})"),)
     found = [*_thrusts(flown, vehicle)]
-    if not (row.beyond and flown.supervised):  # a control flight shows what happens
+    if not (row.beyond and flown.supervised):  # a control flight shows the effect
         found += [*_motion(flown, row, push_n), *_outcome(flown, row, expected)]
     if flown.supervised:
         found += [*_states(flown, row, expected)]
@@ -86,7 +86,7 @@ def _thrusts(flown: Flown, vehicle: VehicleParams) -> Iterator[Broken]:
 
 
 def _motion(flown: Flown, row: Scenario, push_n: float) -> Iterator[Broken]:
-    """What the vehicle did by the truth."""
+    """Motion of the vehicle by the truth."""
     if flown["crashed"] > 0.0:
         yield Broken("crash", flown.reason)
     if not row.rotor_lost and flown["tilt_peak_deg"] > TILT_DEG:
@@ -114,7 +114,7 @@ def _outcome(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken
 
 
 def _states(flown: Flown, row: Scenario, expected: Expected) -> Iterator[Broken]:
-    """What the supervisor did, and whether it said why."""
+    """Actions of the supervisor, and whether it gave reasons."""
     if flown["state_before"] > 0.0:
         yield Broken("false alarm", f"{STATES[int(flown['state_before'])]} before the fault")
     if severity(expected.reach) > 0:

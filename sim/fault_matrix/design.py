@@ -43,7 +43,7 @@ class Choice:
     unsupervised: bool = False  # only the flights without the supervisor
 
     def __post_init__(self) -> None:
-        """Refuse what flies nothing."""
+        """Refuse a design without flights."""
         if not self.rows:
             raise out_of_range("--rows", self.pattern, "", f"no row matches; rows: {', '.join(_names())}")
 

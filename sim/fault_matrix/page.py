@@ -17,7 +17,7 @@ from sim.fault_matrix.criteria import (
     TILT_CONTACT_DEG,
     TILT_DEG,
 )
-from sim.fault_matrix.verdict import Judged, Verdict
+from sim.fault_matrix.verdict import Tally, Verdict
 from sim.faults.scenario import WATCH_S
 
 #: Most failures that are listed for a row at a place.
@@ -29,21 +29,21 @@ stays within {tilt:g} deg ({contact:g} in contact) unless a rotor is lost, its p
 reference and {push:g} N, its speed within {speed:g} m/s; the expected state is reached in time, every change of state
 has a reason, a job that must be completed is, and a vehicle that must retreat has left the wall {leave:g} s after the
 latest begin of the retreat and advanced by at most {advance:g} m. The flight goes on for {watch:g} s after the fault,
-whatever the strategy does.
+independent of the strategy.
 """
 _LEGEND = """\
 *place*: in contact in the middle of the stroke, or free on the way to the wall. *passed*: flights with the supervisor.
 Tilt, push, speed and the time from the fault to the retreat are the worst of these flights (of the control flights
 where none was flown). *state*: most severe states reached. *control fails*: flights without the supervisor that break a
 criterion, and which; **bold** where they must and do not. †: no law could save the vehicle; only commands and states
-are judged.
+are scored.
 """
 _BORNE = """\
-The other {borne} need not: there validation, estimation, the law or the strategy bears the fault. They do not show that
-the supervisor is needed."""
+The other {borne} need not: there validation, estimation, the law or the strategy tolerates the fault. They do not show
+that the supervisor is needed."""
 _ATTAINABLE = """\
 Least tilt at which the rotors carry the weight with no roll and pitch moment, by the facets of the attainable wrench
-set (`allocation/hover.py`), for the worst rotor. Where there is none up to 60 deg, no law can hold the vehicle in
+set (`allocation/hover.py`), for the worst rotor. Without one up to 60 deg, no law can hold the vehicle in
 the air.
 """
 _HEADS = ("fault", "place", "passed", "tilt deg", "push N", "speed m/s", "retreat s", "state", "control fails", "by")
@@ -56,8 +56,8 @@ def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, comman
 
     Args:
         verdicts: The rows.
-        hovers: What faults of rotors leave.
-        lead: A sentence on what was flown.
+        hovers: Remaining hovers after faults of rotors.
+        lead: A sentence on the flights.
         command: Command that repeats it.
         vehicle: Limits of the thrusts.
     """
@@ -69,7 +69,7 @@ def page(verdicts: Sequence[Verdict], hovers: Sequence[Hover], lead: str, comman
     chapters = {
         "Flights that failed": _failures(verdicts),
         "Rows that prove nothing": _idle(verdicts),
-        "What the rotors can still do": _hovers(hovers, verdicts),
+        "Remaining actuation": _hovers(hovers, verdicts),
     }
     return text + "".join(f"\n## {title}\n\n{chapter}" for title, chapter in chapters.items() if chapter)
 
@@ -136,8 +136,8 @@ def _failures(verdicts: Sequence[Verdict]) -> str:
     lines = []
     for verdict in verdicts:
         for world, seed, criteria in verdict.flown.failures[:LISTED]:
-            what = "; ".join(criterion.text for criterion in criteria)
-            lines.append(f"- {verdict.row.name}, {verdict.place}, {world}, seed {seed}: {what}\n")
+            failed = "; ".join(criterion.text for criterion in criteria)
+            lines.append(f"- {verdict.row.name}, {verdict.place}, {world}, seed {seed}: {failed}\n")
         if (more := len(verdict.flown.failures) - LISTED) > 0:
             lines.append(f"- {verdict.row.name}, {verdict.place}: {more} more\n")
     return "".join(lines)
@@ -151,8 +151,8 @@ def _idle(verdicts: Sequence[Verdict]) -> str:
     return "Their control flights must fail, and pass:\n\n" + "".join(lines)
 
 
-def _ends(judged: Judged) -> str:
-    return "; ".join(judged.ends)
+def _ends(tally: Tally) -> str:
+    return "; ".join(tally.ends)
 
 
 def _hovers(hovers: Sequence[Hover], verdicts: Sequence[Verdict]) -> str:

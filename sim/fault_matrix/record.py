@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from sim.fault_matrix.verdict import Judged, Verdict
+from sim.fault_matrix.verdict import Tally, Verdict
 from sim.report.rundir import write_json
 from sim.sweep.parts import write_table
 
@@ -23,7 +23,7 @@ def summary(verdicts: Sequence[Verdict], folder: Path, facts: dict[str, Any]) ->
     Args:
         verdicts: The rows.
         folder: Folder of the run.
-        facts: What was flown: command, version, seed and so on.
+        facts: Of the flights: command, version, seed and so on.
     """
     flown = [verdict for verdict in verdicts if verdict.flown.n]
     return {
@@ -50,16 +50,16 @@ def summary(verdicts: Sequence[Verdict], folder: Path, facts: dict[str, Any]) ->
     }
 
 
-def _entry(judged: Judged) -> dict[str, Any]:
+def _entry(tally: Tally) -> dict[str, Any]:
     return {
-        "n": judged.n,
-        "passed": judged.passed,
-        **judged.worst,
-        "retreat_s": judged.retreat_s,
-        "states": list(judged.states),
+        "n": tally.n,
+        "passed": tally.passed,
+        **tally.worst,
+        "retreat_s": tally.retreat_s,
+        "states": list(tally.states),
         "failures": [
             {"world": world, "seed": seed, "criteria": [criterion.text for criterion in criteria]}
-            for world, seed, criteria in judged.failures
+            for world, seed, criteria in tally.failures
         ],
     }
 

@@ -1,4 +1,4 @@
-"""Verdict on every row of the matrix at a place: flights that passed, worst figures, and what the control row did."""
+"""Verdict on every row of the matrix at a place: flights that passed, worst figures, and result of the control row."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WORST = ("tilt_peak_deg", "push_peak_n", "speed_peak_m_s")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class Tally:
     """Flights of one row at a place, with or without the supervisor, over all worlds."""
 
     n: int  # flights
@@ -46,12 +46,12 @@ class Verdict:
 
     row: Scenario
     place: str
-    flown: Judged  # with the supervisor
-    control: Judged  # without
+    flown: Tally  # with the supervisor
+    control: Tally  # without
 
     @property
     def expected(self) -> Expected:
-        """What must happen here."""
+        """Expectation at this place."""
         return self.row.places[self.place]
 
     @property
@@ -82,14 +82,14 @@ def verdicts(rows: Sequence[Scenario], table: pl.DataFrame, push_n: float, vehic
         for place, expected in row.places.items():
             of = {name: groups.get((row.name, place, name), []) for name in (SUPERVISED, CONTROL)}
             if any(of.values()):
-                judged = {name: _judged(flights, row, expected, push_n, vehicle) for name, flights in of.items()}
-                found.append(Verdict(row=row, place=place, flown=judged[SUPERVISED], control=judged[CONTROL]))
+                tally = {name: _tally(flights, row, expected, push_n, vehicle) for name, flights in of.items()}
+                found.append(Verdict(row=row, place=place, flown=tally[SUPERVISED], control=tally[CONTROL]))
     return found
 
 
-def _judged(
+def _tally(
     flights: list[dict[str, Any]], row: Scenario, expected: Expected, push_n: float, vehicle: VehicleParams
-) -> Judged:
+) -> Tally:
     flown = [
         Flown(
             reason=flight["reason"],
@@ -100,7 +100,7 @@ def _judged(
         for flight in flights
     ]
     failures = [broken(each, row, expected, push_n, vehicle) for each in flown]
-    return Judged(
+    return Tally(
         n=len(flown),
         passed=sum(not criteria for criteria in failures),
         worst={name: _largest([each[name] for each in flown]) for name in WORST},

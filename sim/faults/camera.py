@@ -12,7 +12,7 @@ from ibvs_qp.config.settings import setting
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from sim.faults.fault import FrameFilter, SensorFault
 
-#: A picture, or what perception found in one.
+#: A picture, or the result of perception for one.
 Picture = RgbdFrame | FeatureFrame
 _NS = 1e9
 

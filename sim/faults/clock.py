@@ -1,4 +1,4 @@
-"""Faults of time: a clock that leaps, a control loop that stalls, leaves ticks out, or runs slowly."""
+"""Faults of time: a clock that jumps, a control loop that stalls, leaves ticks out, or runs slowly."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _NS = 1e9
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClockLeap(SensorFault):
+class ClockJump(SensorFault):
     """All stamps taken from now on are off; samples taken before keep theirs."""
 
-    offset_s: float = setting(3600.0, "the leap", unit="s", low=-1e9, high=1e9)
+    offset_s: float = setting(3600.0, "the jump", unit="s", low=-1e9, high=1e9)
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Move the stamps of tick, sample and picture."""
         offset, since = round(self.offset_s * _NS), []
 
-        def leapt(frame: SensorFrame) -> SensorFrame:
+        def moved(frame: SensorFrame) -> SensorFrame:
             since[:] = since or [frame.stamp_ns]
             stamps: dict[str, Any] = {"stamp_ns": frame.stamp_ns + offset}
             for name in SENSOR_FRAME.stamps:
@@ -39,7 +39,7 @@ class ClockLeap(SensorFault):
                 frame = with_picture(frame, restamped(picture, picture.stamp_ns + offset))
             return dataclasses.replace(frame, **stamps)
 
-        return leapt
+        return moved
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from ibvs_qp.validation.fields import SENSOR_FRAME
 from sim.world.canvas import Canvas
 from sim.world.plant import Plant
 
-#: What the pilot gets instead of a sensor frame; None: this tick of the pilot does not take place.
+#: Input of the pilot instead of a sensor frame; None: this tick of the pilot does not take place.
 FrameFilter = Callable[[SensorFrame], SensorFrame | None]
 
 
@@ -70,7 +70,7 @@ class NoFault(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class SensorFault(Fault):
-    """A fault of what the pilot gets: sensors, time stamps, or the tick itself."""
+    """A fault of the inputs of the pilot: sensors, time stamps, or the tick itself."""
 
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Nothing else changes."""

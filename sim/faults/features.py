@@ -20,7 +20,7 @@ OF_FRAME, OF_LINE = ("plane", "velocity", "velocity_covariance"), ("rho", "theta
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureFault(SensorFault):
-    """A fault of what perception found in a picture."""
+    """A fault of the result of perception for a picture."""
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """Change the features of every picture."""
@@ -36,7 +36,7 @@ class FeatureFault(SensorFault):
 
     @abstractmethod
     def spoilt(self, features: FeatureFrame, rng: np.random.Generator) -> FeatureFrame:
-        """What perception reports instead."""
+        """Result of perception with the fault."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class WrongLines(FeatureFault):
 class DepthFlipped(FeatureFault):
     """The plane's normal is mirrored left to right and up to down, or the plane lies behind the camera."""
 
-    what: str = choice("normal", "what is flipped", ("normal", "sign"))
+    what: str = choice("normal", "flipped parts", ("normal", "sign"))
 
     def spoilt(self, features: FeatureFrame, rng: np.random.Generator) -> FeatureFrame:
         """With the flipped plane."""
@@ -112,7 +112,7 @@ class FeatureNan(FeatureFault):
     once: bool = setting(True, "in one picture only")
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
-        """As all, but for one picture."""
+        """As all, except for one picture."""
         every, spoilt = super().filter(rng), []
 
         def first(frame: SensorFrame) -> SensorFrame | None:

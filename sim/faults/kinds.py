@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.faults.air import SidePush, WindStep
 from sim.faults.camera import CameraFrozen, CameraJitter, CameraLatency, CameraLost, CameraReordered
-from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
+from sim.faults.clock import ClockJump, LoopStall, SlowLoop, TicksSkipped
 from sim.faults.fault import ChannelFault, Fault, NoFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
@@ -23,6 +23,6 @@ KINDS: dict[str, type[Fault]] = {
         ForceTorqueLost, ForceTorqueStuck, ForceTorqueNan, ForceTorqueZero, ForceTorqueBias,
         ImuStuck, ImuLate, ImuNan, GyroBias, AttitudeStep, AccelerometerBias,
         Derate, RotorStuck, ThrustLoss, WindStep, SidePush, OtherWall, BoardMoved, EdgeBroken,
-        ClockLeap, LoopStall, SlowLoop, TicksSkipped, SolverInfeasible, SolverSilent,
+        ClockJump, LoopStall, SlowLoop, TicksSkipped, SolverInfeasible, SolverSilent,
     )
 }  # fmt: skip

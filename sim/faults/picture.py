@@ -14,7 +14,7 @@ from sim.faults.camera import picture_of, with_picture
 from sim.faults.fault import FrameFilter, SensorFault
 from sim.sensors.edge_view import SHORTEST
 
-#: Width of the soft rim, as a fraction of the ellipse: what lies on the lens is out of focus.
+#: Width of the soft rim, as a fraction of the ellipse: dirt on the lens is out of focus.
 _RIM = 0.5
 #: Covered by more than this counts as hidden.
 _HALF = 0.5
@@ -55,7 +55,7 @@ class PictureCovered(SensorFault):
         return covered
 
     def hidden(self, x: Any, y: Any) -> np.ndarray:
-        """How much of what lies at (x, y) is covered, 0..1."""
+        """Covered fraction at (x, y), 0..1."""
         radius = np.hypot((x - self.right) / self.half_width, (y - self.down) / self.half_height)
         return np.clip((1.0 - radius) / _RIM + _HALF, 0.0, 1.0)
 

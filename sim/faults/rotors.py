@@ -59,7 +59,7 @@ class Derate(RotorFault):
 
 @dataclass(frozen=True, kw_only=True)
 class RotorStuck(RotorFault):
-    """One rotor, or all, give a fixed thrust whatever is commanded; nothing reports it."""
+    """One rotor, or all, give a fixed thrust for any command; nothing reports it."""
 
     thrust_n: float = setting(11.3, "its thrust", unit="N", low=0.0, high=100.0)
 
@@ -77,9 +77,9 @@ class RotorStuck(RotorFault):
 
 @dataclass(frozen=True, kw_only=True)
 class ThrustLoss(RotorFault):
-    """One rotor, or all, give only a fraction of what is commanded: sagging battery, damaged blade."""
+    """One rotor, or all, give only a fraction of the command: sagging battery, damaged blade."""
 
-    share: float = setting(0.86, "thrust over what it was before", low=0.01, high=2.0)
+    share: float = setting(0.86, "thrust over the value before", low=0.01, high=2.0)
 
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Scale the thrusts of the plant."""

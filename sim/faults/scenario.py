@@ -1,4 +1,4 @@
-"""The fault matrix as data: rows of ``scenarios/*.toml``, each a fault, where it strikes, and what must happen."""
+"""The fault matrix as data: rows of ``scenarios/*.toml``, each a fault, its place, and the expectation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STATES = tuple(str(state) for state in SafetyState)
 
 @dataclass(frozen=True, kw_only=True)
 class Expected(Checked):
-    """What must happen at one place."""
+    """Expectation at one place."""
 
     reach: str = choice("nominal", "this state or a more severe one must be reached", _STATES)
     within_s: float = setting(0.3, "latest, after the fault can be observed", unit="s", low=0.0, high=60.0)
@@ -44,18 +44,18 @@ class Scenario(Checked):
     """One row of the matrix."""
 
     name: str
-    about: str = ""  # what the row is for, where its name does not say it
+    about: str = ""  # purpose of the row, if its name does not show it
     faults: tuple[Fault, ...] = ()  # the faults, at the same time
     observable_s: float = setting(0.0, "time after which the fault can be observed", unit="s", low=0.0, high=60.0)
     when_it_deviates: bool = setting(False, "it can be observed only once a rotor differs from its command, after that")
     contact: Expected | None = None  # in contact; None is not flown
     free: Expected | None = None  # on the way to the wall
     rotor_lost: bool = setting(False, "a rotor is lost: the bound on the tilt does not apply")
-    beyond: str = ""  # why no law could save the vehicle; only the commands and the reports are judged then
+    beyond: str = ""  # why no law could save the vehicle; only the commands and the reports are scored then
 
     @property
     def places(self) -> dict[str, Expected]:
-        """What must happen, by place."""
+        """Expectations by place."""
         given = {"contact": self.contact, "free": self.free}
         return {place: expected for place, expected in given.items() if expected is not None}
 

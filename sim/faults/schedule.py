@@ -61,7 +61,7 @@ class FaultSchedule:
         return happened
 
     def seen(self, frame: SensorFrame) -> SensorFrame | None:
-        """What the pilot gets of a sensor frame; None: this tick of the pilot does not take place.
+        """Input of the pilot for a sensor frame; None: this tick of the pilot does not take place.
 
         The newest picture of the ticks that are left out waits in the camera's driver.
         """

@@ -19,7 +19,7 @@ def qp_engine(pilot: Pilot) -> Any:
     """The engine of the pilot's QP law.
 
     Raises:
-        ConfigError: When the pilot flies another law.
+        ConfigError: When the pilot has another law.
     """
     engine = getattr(pilot.controller, "engine", None)
     if engine is None:
@@ -43,7 +43,7 @@ class SolverFault(Fault):
 
     @abstractmethod
     def solution(self, engine: Any, solve: Callable[[], Any]) -> Callable[[], Any]:
-        """What is called instead of ``solve``."""
+        """Function in place of ``solve``."""
 
 
 @dataclass(frozen=True, kw_only=True)

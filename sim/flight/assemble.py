@@ -1,4 +1,4 @@
-"""Rows of a log into the named arrays of a trace: after the flight, or from what a killed flight left on disk."""
+"""Rows of a log into the named arrays of a trace: after the flight, or from the log of a killed flight on disk."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CLEARANCE_S = 0.02
 NUMBERS = "t phase row outcome step_us iterations reach_margin".split()
 #: Columns of integers.
 INTEGERS = ("phase", "row", "outcome", "iterations")
-#: Inputs of the controller's step that are logged, beside those of every line.
+#: Inputs of the controller's step that are logged, in addition to those of every line.
 CONTACT_INPUTS = tuple(f"contact.{name}" for name in ("known", "distance", "push", "ramp"))
 INPUTS = (*CONTACT_INPUTS, "contact_weight", "velocity_known", "velocity")
 _PRESSED = [PHASES.index(phase) for phase in ("paint", "retouch", "climb")]
@@ -34,7 +34,7 @@ _PRESSED = [PHASES.index(phase) for phase in ("paint", "retouch", "climb")]
 
 @dataclass(frozen=True, kw_only=True)
 class Flown:
-    """Who flew where: what the rows of a log mean depends on it."""
+    """Law, vehicle and scene of a log, which its rows depend on."""
 
     scene: Scene
     seed: int
@@ -53,7 +53,7 @@ class Flown:
 
 @dataclass(kw_only=True)
 class LoggedRows:
-    """What a recorder logged."""
+    """Contents of a recorder's log."""
 
     columns: dict[str, np.ndarray]  # (N,) or (N, width)
     program: np.ndarray | None  # (N, P)
@@ -88,8 +88,8 @@ def assemble(flown: Flown, rows: LoggedRows) -> dict[str, np.ndarray]:
     arrays["active"], arrays["limit_price"] = active, price
     if rows.program is not None:
         arrays["program"] = rows.program
-    believed = flown.config.controller.vehicle
-    arrays["thrust_min"], arrays["thrust_max"] = believed.thrust_min, believed.thrust_max
+    nominal = flown.config.controller.vehicle
+    arrays["thrust_min"], arrays["thrust_max"] = nominal.thrust_min, nominal.thrust_max
     arrays["true_thrust_min"], arrays["true_thrust_max"] = rows.thrust_limits
     arrays["true_mass"] = np.array([flown.vehicle.mass_kg])
     arrays["vision_ms"] = np.array(rows.vision_ms, float)

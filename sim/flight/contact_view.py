@@ -1,4 +1,4 @@
-"""What the camera sees of the lines of a paint job while the brush presses: geometry of a level vehicle at its place.
+"""View of the lines of a paint job while the brush presses: geometry of a level vehicle at its place.
 
 A line is in view where it lies within the bounds that the controller keeps guides in (`LimitSettings.view_left` and so
 on, from the camera of the vehicle), and outside the brush.
@@ -21,7 +21,7 @@ class ContactView:
 
     Args:
         pattern: Directions of the strokes.
-        config: The vehicle as the controller believes it, its bounds of the view, and the shortest line.
+        config: The nominal vehicle of the controller, its bounds of the view, and the shortest line.
         brush_width_m: Diameter of the brush, which hides the wall [m].
     """
 

@@ -41,7 +41,7 @@ def write_log(stream: BinaryIO, traces: dict[str, Trace]) -> None:
 
 
 def facts_of(trace: Trace) -> dict[str, Any]:
-    """What a log has beside the arrays of a trace and its canvas, as arrays."""
+    """Contents of a log in addition to the arrays of a trace and its canvas, as arrays."""
     facts: dict[str, Any] = {name: np.array(getattr(trace, name), str) for name in ("phases", "outcomes", "limits")}
     facts["event_t"] = np.array([event.t for event in trace.events])
     facts["event_text"] = np.array([[event.kind, event.text] for event in trace.events], dtype=str)

@@ -96,5 +96,5 @@ class OwnJob:
 
     @property
     def plan(self) -> dict[str, float]:
-        """None: its legs are judged."""
+        """None: its legs are scored."""
         return {}

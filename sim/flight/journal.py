@@ -55,7 +55,7 @@ class Journal:
         self._call(lambda: self._open(header))
 
     def append(self, logs: Sequence[np.ndarray], programs: Sequence[np.ndarray], note: dict[str, Any]) -> None:
-        """Append a chunk: rows of the log and of the program, and what else happened.
+        """Append a chunk: rows of the log and of the program, and events.
 
         Args:
             logs: Numbers of every tick, (columns,) each.
@@ -91,5 +91,5 @@ class Journal:
             work()
         except OSError as error:
             raise IbvsQpError(
-                f"cannot write the log of the flight: {error.strerror or error}; what was written is in {self._folder}"
+                f"cannot write the log of the flight: {error.strerror or error}; its first part is in {self._folder}"
             ) from None

@@ -27,8 +27,8 @@ def check_arrays(arrays: Mapping[str, np.ndarray]) -> None:
         array, letters = arrays[name], _letters(name)
         fixed = tuple(int(x) if x.isdigit() else sizes.setdefault(x, n) for x, n in zip(letters, array.shape))  # noqa: B905
         if array.dtype.kind not in "biuf" or len(letters) != array.ndim or fixed != array.shape:
-            wanted = ", ".join(f"{x} = {sizes[x]}" if x in sizes else x for x in letters)
-            raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, wanted are numbers ({wanted})")
+            needed = ", ".join(f"{x} = {sizes[x]}" if x in sizes else x for x in letters)
+            raise ValueError(f"array {name} has shape {array.shape} of {array.dtype}, needed are numbers ({needed})")
     for name in _NAMES & arrays.keys():
         array = arrays[name]
         if array.ndim != 1 or array.dtype.kind != "U":

@@ -1,4 +1,4 @@
-"""A simulated flight as an MCAP log: what the pilot's recorder writes, and the truth on topics of its own."""
+"""A simulated flight as an MCAP log: the topics of the pilot's recorder, and the truth on topics of its own."""
 
 from __future__ import annotations
 

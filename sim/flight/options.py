@@ -35,7 +35,7 @@ SLACK_M = 5e-3
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `compiled` the controller runs as C code where there is a compiler: the same flight to the bit, faster. A
+    With `compiled` the controller runs as C code if there is a compiler: a bit-identical flight, faster. A
     `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself, the predictive one
     with `rival_settings` if there are any. With a `journal` the rows of the log are written to that folder while the
     flight goes on, with `mcap` an MCAP log, too.

@@ -22,7 +22,7 @@ def built(name: str, base: type[Own], option: str, *arguments: Any) -> Own:
 
     Args:
         name: ``module:Class``, imported as Python does and from the current folder, or ``file.py:Class``.
-        base: What the class must be a subclass of.
+        base: Required base class.
         option: Option that names it, for messages.
         arguments: Of its constructor.
 

@@ -1,7 +1,7 @@
-"""Checks of a job before its flight: what board, strokes, brush, camera, sensors and colours cannot do together.
+"""Checks of a job before its flight: conflicts of board, strokes, brush, camera, sensors and colours.
 
 Every limit follows from a setting or from geometry; a truth of the plant, such as a wrong mass, is never refused here,
-but for motors that are much slower than the vehicle's.
+except for motors that are much slower than the vehicle's.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ CONTROL_RESERVE_M_S2 = 0.5
 #: Mean lag of the plant's motors over the vehicle's, at most [-]: the QP completes at 1.9 (2 seeds of the world
 #: datasheet), a monitor ends 1 of 2 flights at 2.3, and it crashes at 2.6.
 LARGEST_LAG_RATIO = 2.0
-#: Noise of the IMU per sample, at most: accelerometer [m/s^2], gyro [rad/s], attitude [deg]. Between what both laws
-#: completed with, 0.95, 0.095 and 0.4 (2 seeds each in the world datasheet), and what they failed with: 1.9, 0.19, 0.8.
+#: Noise of the IMU per sample, at most: accelerometer [m/s^2], gyro [rad/s], attitude [deg]. Between the
+#: values of completed flights, 0.95, 0.095 and 0.4 (2 seeds each in the world datasheet), and of failed ones: 1.9, 0.19
+#: and 0.8, under both laws.
 MOST_ACCEL_NOISE, MOST_GYRO_NOISE, MOST_ATTITUDE_NOISE_DEG = 1.2, 0.12, 0.5
 #: Time of a job in gusts over that of its strokes alone [-]: most of them are painted again in the harsh world.
 AGAIN = 2.0
@@ -65,7 +66,7 @@ def check_job(scene: Scene, config: PilotConfig, features: str = "rendered", job
 
 
 def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", job: Job | None = None) -> list[str]:
-    """What forbids a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
+    """Conflicts that forbid a flight, one sentence each; arguments as of `check_job`. Empty: it can be flown."""
     problems = [*_sensors(scene, config), *_wind(scene, config), *_motors(scene, config), *_period(config)]
     if features == "rendered":
         problems += _colours(scene, config)
@@ -124,7 +125,7 @@ def _strokes(board: BoardGeometry) -> Iterator[str]:
 
 
 def _start(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
-    """At the start nothing touches ground, board or wall, whatever the seed."""
+    """At the start nothing touches ground, board or wall, for any seed."""
     start, vehicle = board.scene.start, config.controller.vehicle
     sunk = float(board.start_tip[2]) - vehicle.tip_position_m[2] + START_DOWN_M + GROUND_CLEARANCE_M
     if sunk > 0.0:
@@ -317,7 +318,7 @@ def _motors(scene: Scene, config: PilotConfig) -> Iterator[str]:
 
 
 def _colours(scene: Scene, config: PilotConfig) -> Iterator[str]:
-    """Board, wall and paint are told apart by colour, whatever the gap between board and wall."""
+    """Board, wall and paint differ in colour, at any gap between board and wall."""
     gate = config.vision.line.color_gate
     colors = {"board": scene.board.color, "wall": scene.wall.color, "paint": scene.paint.color}
     for one, other in (("paint", "board"), ("wall", "board"), ("wall", "paint")):

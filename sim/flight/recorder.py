@@ -48,7 +48,7 @@ def truth_signals(plant: Plant) -> dict[str, np.ndarray]:
 
 
 class _Kept(NamedTuple):
-    """What the journal has."""
+    """Contents of the journal."""
 
     ticks: int = 0
     events: int = 0
@@ -69,7 +69,7 @@ class Recorder:
         self._limits: dict[str, int] = {}
         self._active: dict[int, list[tuple[int, float]]] = {}
         self._program = program_point(pilot)
-        # Single precision halves the log; its rounding of 1e-7 does not change what `ibvs-qp explain` prints.
+        # Single precision halves the log; its rounding of 1e-7 does not change the output of `ibvs-qp explain`.
         self._programs = Columns({"program": 0 if self._program is None else len(self._program)}, np.float32)
         self._vision: list[float] = []
         self._events: list[Event] = []
@@ -122,7 +122,7 @@ class Recorder:
             self._keep(self._journal)
 
     def _keep(self, journal: Journal) -> None:
-        """Append what is new since the last time to the journal."""
+        """Append new rows to the journal."""
         before, self._kept = self._kept, _Kept(self._ticks, len(self._events), len(self._vision))
         names, ticks = tuple(self._limits), range(before.ticks, self._ticks)
         paid = {tick: self._active[tick] for tick in ticks if tick in self._active}

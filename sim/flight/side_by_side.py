@@ -29,7 +29,7 @@ LawProgress = Callable[[str, float, str, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Flight:
-    """A trace, and the peak memory of the process that flew it if it was not this one [bytes]."""
+    """A trace, and the peak memory of its process if it was not this one [bytes]."""
 
     trace: Trace
     process_memory_bytes: int = 0
@@ -98,7 +98,7 @@ def _fly_apart(
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     with _Link(progress) as link:
-        calls = [joblib.delayed(_fly_in_worker)(scene, job, task, link.news, link.stop) for job in jobs.values()]
+        calls = [joblib.delayed(_fly_in_worker)(scene, job, task, link.updates, link.stop) for job in jobs.values()]
         try:
             with (
                 joblib.parallel_config(backend="loky", inner_max_num_threads=1),
@@ -111,16 +111,16 @@ def _fly_apart(
         except BrokenProcessPool:
             if link.stopping:  # a stop of the whole group came before the worker could ignore it
                 raise KeyboardInterrupt from None
-            raise RuntimeError("a process that flew a law died; was it out of memory?") from None
+            raise RuntimeError("the process of a flight died; was it out of memory?") from None
         finally:
             get_reusable_executor().shutdown(wait=False, kill_workers=True)
 
 
-def _fly_in_worker(scene: Scene, options: FlightOptions, task: Job | None, news: Any, stop: Any) -> Flight:
+def _fly_in_worker(scene: Scene, options: FlightOptions, task: Job | None, updates: Any, stop: Any) -> Flight:
     live_with_parent()  # `stop` ends the flight
 
     def report(flown_s: float, phase: str, real_time_factor: float) -> None:
-        news.put((options.law, flown_s, phase, real_time_factor))
+        updates.put((options.law, flown_s, phase, real_time_factor))
         if stop.is_set() and phase not in ("done", INTERRUPTED):
             raise KeyboardInterrupt
 
@@ -140,19 +140,19 @@ class _Link:
     def __enter__(self) -> _Link:
         with handled_ctrl_c(signal.SIG_IGN):
             self._manager.start(live_with_parent)
-        self.news, self.stop = self._manager.Queue(), self._manager.Event()
+        self.updates, self.stop = self._manager.Queue(), self._manager.Event()
         self._reader = threading.Thread(target=self._pass_on, daemon=True)
         self._reader.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.news.put(None)
+        self.updates.put(None)
         self._reader.join()
         self._manager.shutdown()
 
     def _pass_on(self) -> None:
-        while (news := self.news.get()) is not None:
-            self._progress(*news)
+        while (updates := self.updates.get()) is not None:
+            self._progress(*updates)
 
     def stop_flights(self, *_: Any) -> None:
         """Signal handler: end the flights; the next Ctrl-C raises."""

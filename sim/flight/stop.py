@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a flight in the same way: with what was flown written."""
+"""Ctrl-C and SIGTERM end a flight in the same way: with the flight so far on disk."""
 
 from __future__ import annotations
 

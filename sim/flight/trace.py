@@ -99,7 +99,7 @@ class Trace:
     outcomes: tuple[str, ...] = ()  # names of the outcomes
     limits: tuple[str, ...] = ()  # names of the limits, columns of ``active``
     events: list[Event] = field(default_factory=list)  # phase changes and other events in order
-    claimed: bool = False  # whether the pilot ended its job as planned, by what it knows (truth: sim.evaluate.truth)
+    claimed: bool = False  # whether the pilot ended its job as planned, by its own data (truth: sim.evaluate.truth)
     # Least durations [s] of the phases of a job without strokes (`sim.flight.jobs.PressJob`); empty for a paint job.
     plan: dict[str, float] = field(default_factory=dict)
     # Way (right, down) along the board in every leg of a strategy of the user's [m]; None for a shipped one.

@@ -3,7 +3,7 @@
 It has the inputs of the figures only (`FIGURE_INPUTS`), the contact at the physics rate, and the paint coverage.
 Signals are rounded to single precision (1e-7 of their value) and times to 1 ns; all else is exact, and the tip, whose
 place decides to which stroke, corner or piece of a line a tick belongs. A signal is stored as the differences of its
-bit patterns from tick to tick, by bytes, highest bytes together: these hardly change, so that they compress well.
+bit patterns from tick to tick, by bytes, highest bytes together: these change little, so that they compress well.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def save_trace(file: Path, trace: Trace) -> None:
 
 
 def load_trace(file: Path) -> Trace:
-    """Read a flight back; arrays beside `FIGURE_INPUTS`, the canvas and the pictures are missing.
+    """Read a flight back; arrays other than `FIGURE_INPUTS`, the canvas and the pictures are missing.
 
     Raises:
         ConfigError: When the file is missing, damaged, or no trace.

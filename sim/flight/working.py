@@ -56,11 +56,11 @@ def write(
 
 @contextlib.contextmanager
 def working(console: Console, text: str) -> Iterator[Callable[[str], None]]:
-    """Show what is being done while the context is open.
+    """Show the present work while the context is open.
 
     Args:
         console: Standard error.
-        text: What is being done.
+        text: Name of the work.
 
     Yields:
         A function that replaces the text.

@@ -31,7 +31,7 @@ STYLES = {
 }
 #: Limits shown at most, and decades of their colour scale.
 MOST_LIMITS, DECADES = 7, 4.0
-#: The tilt bound is drawn below this many times the greatest tilt; top of its axes over what they show [-].
+#: The tilt bound is drawn below this many times the greatest tilt; top of its axes over the largest value [-].
 NEAR_BOUND, TILT_HEADROOM = 1.5, 1.2
 #: One dot of force per so many ticks.
 EVERY = 8
@@ -142,14 +142,14 @@ def _draw_multipliers(axes: Axes, comparison: Comparison) -> None:
 
 def _draw_reach(axes: Axes, flights: dict[str, Trace], comparison: Comparison) -> None:
     """Draw the forces attainable in level flight now and, as an outline, before; and dots for those in contact."""
-    believed = comparison.setting.pilot.controller.vehicle
-    if believed.geometry.count == 6:
-        _draw_cuts(axes, *(_rotors(flights[name], believed).level_cut() for name in ("QP now", "QP before")))
+    nominal = comparison.setting.pilot.controller.vehicle
+    if nominal.geometry.count == 6:
+        _draw_cuts(axes, *(_rotors(flights[name], nominal).level_cut() for name in ("QP now", "QP before")))
     else:
         note_empty(axes, "the attainable set is drawn for six rotors only")
     for name, trace in flights.items():
         thrusts = trace.thrusts_actual[trace.push_true > CONTACT_N][::EVERY]
-        front, right = _rotors(trace, believed).matrix[:2] @ thrusts.T
+        front, right = _rotors(trace, nominal).matrix[:2] @ thrusts.T
         axes.plot(right, front, ".", color=STYLES[name]["color"], markersize=2.5)
     axes.axhline(0.0, color="#999999", linewidth=0.5)
     axes.axvline(0.0, color="#999999", linewidth=0.5)
@@ -166,8 +166,8 @@ def _draw_cuts(axes: Axes, now: np.ndarray, before: np.ndarray) -> None:
     axes.fill(*before.T, facecolor="none", edgecolor=STYLES["QP before"]["color"], linewidth=0.5)
 
 
-def _rotors(trace: Trace, believed: VehicleParams) -> Case:
+def _rotors(trace: Trace, nominal: VehicleParams) -> Case:
     """Vehicle with the mass and the thrust limits of a flight; all flights of a comparison have the same rotors."""
     low, high = tuple(trace.thrust_min.tolist()), tuple(trace.thrust_max.tolist())
     flown = {"mass_kg": trace.true_mass.item(), "thrust_min_n": low, "thrust_max_n": high}
-    return Case(vehicle=dataclasses.replace(believed, **flown))
+    return Case(vehicle=dataclasses.replace(nominal, **flown))

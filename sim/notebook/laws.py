@@ -126,8 +126,8 @@ def draw_given_up(flight: RecordedFlight) -> Figure:
     contact = flight.t[flight.contact_weight > 0.5]
     if len(contact):
         grid[0, 0].set_xlim(contact[0] - 0.1, flight.t[-1])
-    grid[0, 0].set_ylabel("forces given up [N]")
-    grid[1, 0].set_ylabel("moments given up [N m]")
+    grid[0, 0].set_ylabel("unallocated forces [N]")
+    grid[1, 0].set_ylabel("unallocated moments [N m]")
     grid[0, 0].legend(loc="center right", ncols=3, fontsize=7)
     grid[1, 0].legend(loc="lower right", ncols=3, fontsize=7)
     figure.align_ylabels(grid[:, 0])

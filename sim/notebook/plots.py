@@ -1,4 +1,4 @@
-"""What the figures of several notebooks share: shaded spans of time and curves of vectors."""
+"""Common parts of the figures of several notebooks: shaded spans of time and curves of vectors."""
 
 from __future__ import annotations
 

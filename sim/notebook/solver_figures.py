@@ -18,7 +18,7 @@ from sim.notebook.solvers import NEVER, Result
 COLOURS = {
     "OSQP, workspace": BLUE, "shipped": "#c2410c", "active set": GREEN, "qpsolvers": "#8a8a8a", "yours": "#7b3fa0",
 }  # fmt: skip
-#: Thrust error that is small beside the noise of the thrusts [N].
+#: Thrust error that is small against the noise of the thrusts [N].
 SMALL_N = 1e-2
 #: Time between two ticks [us].
 TICK_US = 4000.0
@@ -55,7 +55,7 @@ def draw_race(results: Sequence[Result]) -> Figure:
 
 
 def _write_names(figure: Figure, axes: Axes, results: Sequence[Result], places: list[tuple[float, float]]) -> None:
-    """Write the names beside their dots without overlaps with each other, dots or lines."""
+    """Write the names next to their dots without overlaps with each other, dots or lines."""
     figure.draw_without_rendering()
     points = [axes.transData.transform(line.get_xydata()) for line in axes.lines[: 2 * len(results)]]
     taken = [Bbox((each.min(axis=0) - _DOT_PX, each.max(axis=0) + _DOT_PX)) for each in points]

@@ -29,7 +29,7 @@ _REDUCED_N = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A flown setting beside the previous setting and the analytic law."""
+    """A flown setting with the previous setting and the analytic law."""
 
     base: Setting  # the preset with which the controls began
     setting: Setting  # the setting
@@ -152,10 +152,10 @@ def analytic_setting(setting: Setting, own_gains: bool = True) -> Setting:
 
 
 def load_setting(preset: str) -> Setting:
-    """A setting from a preset: a shipped one by name, or a file, with the scene that `save_setting` put beside it.
+    """A setting from a preset: a shipped one by name, or a file, with the scene that `save_setting` put next to it.
 
     Raises:
-        ConfigError: When it cannot be read, flies the analytic law, or the rotors have different limits.
+        ConfigError: When it cannot be read, has the analytic law, or the rotors have different limits.
     """
     file = _path(preset)
     if not file.exists():
@@ -217,7 +217,7 @@ def _scene_file(preset: Path) -> Path:
 
 
 def save_setting(setting: Setting, preset: str | Path) -> tuple[Path, Path]:
-    """Write a setting as a preset and, beside it, a scene (friction, slope, gusts and push belong to the scene).
+    """Write a setting as a preset and, next to it, a scene (friction, slope, gusts and push belong to the scene).
 
     Returns:
         Both files.

@@ -1,4 +1,4 @@
-"""Notebook 04: what a vehicle can do in level flight at a wall, what the loss of a rotor leaves, choice of a design."""
+"""Notebook 04: actuation in level flight at a wall and after the loss of a rotor, choice of a design."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TRAVELS = {"up": (0.0, 0.0, -1.0), "sideways": (0.0, 1.0, 0.0), "down": (0.0, 0.
 FRONT, RIGHT, DOWN, ROLL, PITCH, YAW = np.eye(6)
 #: Half size of the square that a cut starts from [N, N m], and area below which a cut is empty.
 LARGEST, EMPTY_AREA = 1e4, 1e-6
-#: Weight of what must be kept over what is minimised after the loss of a rotor, and its largest residual [N, N m].
+#: Weight of the kept over the minimised quantities after the loss of a rotor, and its largest residual [N, N m].
 KEEP_WEIGHT, KEPT = 1e4, 1e-2
 
 _facets = functools.lru_cache(maxsize=64)(WrenchFacets)
@@ -45,7 +45,7 @@ class Case:
     """A vehicle and the state of its rotors."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)  # mass, geometry, limits, tip
-    weak_rotor: str = ""  # name of a rotor with less thrust; empty if there is none
+    weak_rotor: str = ""  # name of a rotor with less thrust; empty without one
     fraction: float = 1.0  # part of its full thrust that remains; 0 is a lost rotor
 
     @property
@@ -112,7 +112,7 @@ class Case:
         r"""Corners of all (a, b) for which the wrench :math:`w_0 + a\,d_1 + b\,d_2` is attainable.
 
         With six rotors a wrench has unique thrusts :math:`u = B^{-1} w`, so each thrust limit is a half-plane in
-        (a, b). A large square is clipped with one after the other.
+        (a, b). A large square is clipped with each in sequence.
 
         Args:
             origin: Wrench w_0, (6,) [N, N m].
@@ -170,7 +170,7 @@ def abilities(case: Case, friction: float) -> dict[str, float]:
 
 
 def after_loss(case: Case) -> tuple[float, float, float]:
-    """What level flight without roll and pitch moment costs after the loss of a rotor; NaN where it is impossible.
+    """Cost of level flight without roll and pitch moment after the loss of a rotor; NaN where it is impossible.
 
     Returns:
         Least horizontal force without yaw moment [N], the lean that balances this force [deg], and the least yaw
@@ -225,6 +225,6 @@ def design_map(duties: Duties, tilts_deg: np.ndarray, masses_kg: np.ndarray) -> 
 
 
 def cheapest(designs: pl.DataFrame) -> Case | None:
-    """The design that meets all duties with the least hover power; None if there is none on the map."""
+    """The design that meets all duties with the least hover power; None without one on the map."""
     best = designs.filter(pl.col("margin") >= 0.0).sort("power_w").head(1).to_dicts()
     return vehicle_case(mass_kg=best[0]["mass_kg"], tilt_deg=best[0]["tilt_deg"]) if best else None

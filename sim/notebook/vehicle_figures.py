@@ -86,7 +86,7 @@ def draw_thrusts(case: Case, push_n: float) -> Figure:
 
 
 def draw_sliding(case: Case, frictions: Sequence[float], chosen: float) -> Figure:
-    """Greatest push over the direction of travel as the camera sees it, per friction; the chosen one in colour."""
+    """Greatest push over the direction of travel in the view of the camera, per friction; the chosen one in colour."""
     figure = new_figure(3.5)
     axes = figure.add_subplot(projection="polar")
     azimuths = np.linspace(0.0, 2.0 * np.pi, 181)

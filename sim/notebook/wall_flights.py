@@ -38,7 +38,7 @@ SETTLED_S, HOVER_S = 1.1, 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Setting(Setup):
-    """Pilot configuration with its law, scene and seed; equal settings give the same flight to the bit."""
+    """Pilot configuration with its law, scene and seed; equal settings give bit-identical flights."""
 
     pilot: PilotConfig = field(default_factory=lambda: ibvs_qp.preset("qp"))
     scene: Scene = field(default_factory=near_wall)

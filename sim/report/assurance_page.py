@@ -18,7 +18,7 @@ BEGIN, END = "<!-- policy: generated -->", "<!-- end of policy -->"
 
 
 def policy_table() -> str:
-    """Markdown table of all faults: what detects them, and states by the time for which they have been present."""
+    """Markdown table of all faults: detection, and states by the time for which they have been present."""
     units = {field.name: field.metadata.get("unit", "") for field in dataclasses.fields(SafetySettings)}
     settings = SafetySettings()
     rows = []

@@ -46,7 +46,7 @@ def _paint_rows(path: Path) -> pl.DataFrame:
 def compare(a: pl.DataFrame, b: pl.DataFrame) -> list[dict[str, Any]]:
     """Pair the flights of two runs by experiment, law, variant, parameters and seed, and compare each cell.
 
-    Two `paint` runs pair law by law, whatever their seeds.
+    Two `paint` runs pair law by law, for any seeds.
 
     Returns:
         Per cell: experiment, law, variant, params, n, completed of both, and by figure the differences.

@@ -1,4 +1,4 @@
-"""What two runs did not have in common: options, scene and presets, key by key."""
+"""Differences of two runs: options, scene and presets, key by key."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def differing_runs(a: Path, b: Path) -> list[dict[str, Any]]:
         if (a / name).is_file() and (b / name).is_file():
             pairs.append((f"{Path(name).stem}.", read_toml(a / name), read_toml(b / name)))
     found = [each for prefix, x, y in pairs for each in _differences(prefix, x, y)]
-    if any(each["name"] == "world" for each in found):  # which says it shorter than its numbers
+    if any(each["name"] == "world" for each in found):  # which is shorter than its numbers
         found = [each for each in found if not each["name"].startswith("scene.errors.")]
     return found
 

@@ -13,8 +13,8 @@ _HEAD = """\
 Written by `python -m sim.report.metrics_page` from `sim/evaluate/figures.py`; a test compares the page with it.
 
 From the true state of the simulation, per law under `laws` of `summary.json` and per row under `rows`. A figure without
-data is `null`. A row includes the climb that leads to it. `summary.json` adds what was flown, `interrupted`,
-`wall_time_s` and `peak_memory_bytes` (sum over processes).
+data is `null`. A row includes the climb that leads to it. `summary.json` adds scene, world, seed, preset,
+`interrupted`, `wall_time_s` and `peak_memory_bytes` (sum over processes).
 
 **Pattern coordinates.** u runs along the strokes from the board's edge at which stroke 1 begins, v across them from the
 edge that guides stroke 1. Strokes are called rows, also where the pattern is columns.
@@ -33,11 +33,11 @@ a line on standard error, and it counts as failed in every experiment and sweep.
 A paint job is completed if
 
 - every row is *at its place*: its **place error**, the mean over its straight part (without {corner:.0f} cm at both
-  ends) of (true tip line − nominal line) when it was first painted, is at most {place:.0f} mm, and its band (what
-  the round brush covers, with what was painted again, phase `retouch`) touches or overlaps that of the row
+  ends) of (true tip line − nominal line) when it was first painted, is at most {place:.0f} mm, and its band (the
+  cover of the round brush, with the paint of phase `retouch`) touches or overlaps that of the row
   before everywhere but in the last {end:.0f} cm, by at most {most:g} times the nominal overlap. Nominal lines count
-  from the board's edge, whatever the rows before did, so errors add up;
-- every row has its length within {length:.0f} cm. Only what is painted on the board counts;
+  from the board's edge, independent of the rows before, so errors add up;
+- every row has its length within {length:.0f} cm. Only paint on the board counts;
 - the brush touches in {contact:.0f} % of the painting time, {rough:.0f} % with gusts or in the harsh world;
 - the tip ends at least {away:.0f} cm from the board, without a crash and without a time-out.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: A block of the page: modules or folders, then their texts.
 _BLOCK = re.compile(r"<!-- (?P<places>[\w/. ]+): generated -->\n.*?<!-- end of texts -->", re.DOTALL)
-#: Folders and modules that step in flight or say why a flight ended: every sentence in them is a message.
+#: Folders and modules that step in flight or give the reason of its end: every sentence in them is a message.
 _IN_FLIGHT = (
     "ibvs_qp/bridge/bridge.py ibvs_qp/bridge/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
     "ibvs_qp/estimation ibvs_qp/symbolic/machine_code.py ibvs_qp/model/reporting.py ibvs_qp/qp/compiled.py "
@@ -28,14 +28,14 @@ _PREPARED = re.compile(r"advice|allowed|checks|instead|kind|message|most|need|pr
 _INTERNAL = ("sim/notebook", "sim/report/refusals.py", "sim/rivals/solver.py")
 #: Calls whose texts document settings.
 _DOCUMENTS = {"setting", "choice", "_weight", "_poles", "_slack_weight", "_vector", "split", "kernel"}
-#: What a logger fills in, and marks of a console.
+#: Placeholders of a logger, and marks of a console.
 _FILLED_IN, _MARKUP = re.compile(r"%[rs]"), re.compile(r"\[(bold|/)\]")
 #: Errors that only a fault of the project's own code raises.
 _OWN_FAULTS = {"AttributeError", "KeyError", "MemoryError", "RuntimeError", "LookupError", "TypeError"}
 
 
 def texts_of(source: str, in_flight: bool) -> list[str]:
-    """Sentences of a module that a user may read, without repetition; an ellipsis stands for what is filled in.
+    """Sentences of a module that a user may read, without repetition; an ellipsis stands for a value.
 
     Args:
         source: Text of the module.

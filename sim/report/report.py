@@ -14,7 +14,7 @@ from typing import Any
 from sim.evaluate.flight_table import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace, law_name
-from sim.report.plain_words import OUTCOMES, limit_words
+from sim.report.wording import OUTCOMES, limit_words
 from sim.storage.atomic import write_text
 from sim.video.film import still
 
@@ -109,7 +109,7 @@ def _video(video: Path | None) -> str:
     if video is None:
         return ""
     name = escape(video.name)
-    words = "The vehicle from outside, what its camera sees with the edges found in it, and the push on the board."
+    words = "The vehicle from outside, the view of its camera with the edges found in it, and the push on the board."
     poster = base64.b64encode(pack_picture(still(video, _POSTER)).tobytes()).decode("ascii")
     player = (
         f'<video controls muted loop playsinline preload="metadata" src="{name}" '

@@ -31,11 +31,11 @@ _FILES = ("report.html", "summary.json", "video.mp4", "scene.toml", "log.npz", "
 _RECORD = ("log.npz", "summary.json")
 _README = """One run of ibvs-qp.
 
-report.html   all results on one page; open it in a browser (it plays video.mp4 beside it, and needs nothing else)
+report.html   all results on one page; open it in a browser (it plays video.mp4 of the folder, and needs nothing else)
 summary.json  all figures (docs/metrics.md of the project defines them)
 figures/      the report's figures as PNG
 video.mp4     the vehicle from outside, camera view, phase and push (H.264)
-scene.toml    the scene; the command that flew it: {command}
+scene.toml    the scene; command of the flight: {command}
 preset_*.toml configuration of the pilot under each law
 flight_*.mcap log for Foxglove and Rerun, with --log mcap; check it with: ibvs-qp replay flight_qp.mcap
 log.npz       every array, named <law>/<array>; load it with
@@ -77,7 +77,7 @@ class RunFolder:
 
         Args:
             out: The folder, or None.
-            resume: Whether the command continues what it finds there; only a run of `paint` is then refused.
+            resume: Whether the command continues the run in the folder; only a run of `paint` is then refused.
             overwrite: Whether a run in it may be replaced.
 
         Yields:
@@ -101,7 +101,7 @@ class RunFolder:
         Each replaces that of an earlier run in the same folder when it is complete; the journals are then superfluous.
         """
         with replacing(self.path / "log.npz") as stream:
-            write_log(stream, traces)  # if the disk is full, the log says so before another file is replaced
+            write_log(stream, traces)  # a full disk is noticed here, before another file is replaced
             for law, trace in traces.items():
                 write_text(self.path / "scene.toml", dump_toml(trace.scene))
                 write_text(self.path / f"preset_{law}.toml", trace.preset)
@@ -138,7 +138,7 @@ class RunFolder:
         write_report(self.report, flown, summary_table, figures, film)
 
     def remove_stale(self) -> None:
-        """Remove what is left of an earlier run in the same folder: files that this run did not replace."""
+        """Remove the rest of an earlier run in the same folder: files that this run did not replace."""
         for file, inode in self.before:
             if file.exists() and file.stat().st_ino == inode:
                 file.unlink()
@@ -204,7 +204,7 @@ def as_json(value: Any, indent: int | None = None) -> str:
 
 
 def write_json(file: Path, value: Any) -> None:
-    """Write a JSON file for people too, with line breaks; non-finite numbers become null."""
+    """Write a readable JSON file, with line breaks; non-finite numbers become null."""
     write_text(file, as_json(value, indent=1) + "\n")
 
 

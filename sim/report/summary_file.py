@@ -21,7 +21,7 @@ FACTS = {
     "camera": str,
     "image_size": list,
 }
-#: What every law has besides its figures.
+#: Keys of every law in addition to its figures.
 _OUTCOME = {"completed": bool, "reason": str}
 
 

@@ -13,7 +13,7 @@ from ibvs_qp.qp.solver import ACTIVE_MULTIPLIER, AcceptedSolution
 from sim.rivals.priorities import PriorityProblem
 from sim.rivals.solver import BackedSolver
 
-#: Curvature of a level in directions that none of its rows sees, over its largest [-]: thrusts stay there where the
+#: Curvature of a level in directions that none of its rows contains, over its largest [-]: thrusts stay there where the
 #: level above put them.
 PROXIMAL = 1e-6
 #: Rows of less weight, over the largest of their level, are absent [-].

@@ -8,7 +8,7 @@ from sim.rivals.priorities import PriorityProblem
 
 
 class LexicographicController(HybridController):
-    """`HybridController` without a trade between levels: what the cascade of `CascadeEngine` leaves."""
+    """`HybridController` without a trade between levels: the remainder of the cascade of `CascadeEngine`."""
 
     problem_kind = PriorityProblem
     engine_kind = CascadeEngine

@@ -42,7 +42,7 @@ class MpcController(PaperController):
         super().__init__(config)
 
     def _make_setpoints(self) -> Setpoints:
-        """The shipped set-points, with the prediction's values beside them."""
+        """The shipped set-points, with the prediction's values added."""
         config, model = self.config, Model(self.config)
         rows = [row for task in default_tasks(config) for row in task.rows(model)]
         # Without the filter of its row: that starts at a command which serves the lines, too.

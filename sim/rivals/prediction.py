@@ -1,4 +1,4 @@
-r"""Linear model of the next tenths of a second: vehicle, rotor lag, and the errors that the cost sees.
+r"""Linear model of the next tenths of a second: vehicle, rotor lag, and the errors in the cost.
 
 In the body's axes of this tick the state is :math:`x = (\delta, \nu, T)`: displacement (translation and rotation) since
 this tick, twist, and rotor thrusts. The input u are the thrust commands:

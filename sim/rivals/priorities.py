@@ -38,7 +38,7 @@ def row_levels(names: Sequence[str], levels: Sequence[Sequence[str]] = LEVELS) -
 
 
 class PriorityProblem(QpProblem):
-    """The shipped rows, and beside the weighted program the rows one by one: matrix, target and weight.
+    """The shipped rows, and in addition to the weighted program the rows one by one: matrix, target and weight.
 
     Attributes:
         levels: Indices of the task rows of every level, highest priority first.

@@ -1,1 +1,1 @@
-"""Scenes drawn over the whole documented range of their keys, flown, and judged by the truth."""
+"""Scenes drawn over the whole documented range of their keys, flown, and checked by the truth."""

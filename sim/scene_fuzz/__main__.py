@@ -19,7 +19,7 @@ from typing import cast
 from joblib import Parallel, delayed
 
 from sim.flight.options import FlightOptions
-from sim.scene_fuzz.judge import BAD, COMPLETE, FAILED, OUTCOMES, Judged, judge_draw, judge_file
+from sim.scene_fuzz.check import BAD, COMPLETE, FAILED, OUTCOMES, Checked, check_draw, check_file
 from sim.world.worlds import DEFAULT_WORLD, world_names
 
 #: Longest time of the strokes of a drawn scene [s]; ten times that of the default one would take a day for 150 draws.
@@ -49,15 +49,15 @@ def main() -> int:
         files = [given.scenes] if given.scenes.is_file() else sorted(given.scenes.glob("*.toml"))
         if not files:
             parser.error(f"--scenes: no scene (*.toml) in {given.scenes}")
-        calls = [delayed(judge_file)(file, options, given.world, seed) for file in files for seed in given.seeds]
+        calls = [delayed(check_file)(file, options, given.world, seed) for file in files for seed in given.seeds]
         bad, source = BAD if given.may_fail else (*BAD, FAILED), str(given.scenes)
     else:
         seeds = range(given.first_seed, given.first_seed + given.draws)
-        calls = [delayed(judge_draw)(seed, options, given.world, given.longest) for seed in seeds]
+        calls = [delayed(check_draw)(seed, options, given.world, given.longest) for seed in seeds]
         bad, source = BAD, f"draws from seed {given.first_seed}"
     counts: Counter[str] = Counter()
     hardest = 0.0
-    for each in cast("Iterator[Judged]", Parallel(n_jobs=given.jobs, return_as="generator")(calls)):
+    for each in cast("Iterator[Checked]", Parallel(n_jobs=given.jobs, return_as="generator")(calls)):
         counts[each.outcome] += 1
         hardest = max(hardest, each.push if math.isfinite(each.push) else 0.0)
         if each.outcome != COMPLETE or each.push > HARDEST_PUSH:

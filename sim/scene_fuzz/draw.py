@@ -16,7 +16,7 @@ from sim.world.scene import Scene
 SECTIONS = ("board", "wall", "paint", "start", "camera", "force_torque", "imu", "features", "wind")
 #: Keys moved in one scene, fewest and most.
 FEWEST, MOST = 2, 4
-#: Keys that only change what a flight looks like, one seed to another.
+#: Keys that only change the appearance of a flight, one seed to another.
 _SEEDS = ("texture_seed",)
 #: Keys that the sensor model of lines ignores.
 _PICTURES = ("board.color", "wall.color", "paint.color", "board.clutter", "camera.depth_noise_relative")

@@ -214,7 +214,7 @@ def add_sigma_vs(frame: FeatureFrame, sigma: float, rng: np.random.Generator) ->
     """Add noise to rho [-] and theta [rad] of each line, unreported: the covariances stay as they are.
 
     Args:
-        frame: What perception saw.
+        frame: Result of perception.
         sigma: Standard deviation, the paper's sigma_vs.
         rng: Source of the noise.
     """

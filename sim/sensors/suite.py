@@ -33,7 +33,7 @@ class SensorSuite:
     Args:
         scene: Rates, noise, biases and delays; the errors of the world.
         vehicle: The vehicle that carries them.
-        seed: Same seed, same noise to the bit; each sensor has its own stream.
+        seed: The same seed gives bit-identical noise; each sensor has its own stream.
     """
 
     def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:

@@ -19,11 +19,11 @@ _NS_PER_MIN = 60e9
 
 
 class WrenchErrors:
-    """What a flight's force/torque sensor reads instead of a wrench.
+    """Reading of a flight's force/torque sensor in place of a wrench.
 
     Args:
         errors: Sizes.
-        vehicle: Believed mass of the tool; where tool and sensor are.
+        vehicle: Nominal mass of the tool; where tool and sensor are.
         seed: Seed of the flight.
     """
 
@@ -42,7 +42,7 @@ class WrenchErrors:
         self._limit = np.array([errors.overload_n or math.inf] * 3 + [math.inf] * 3)
 
     def applied(self, wrench: np.ndarray, truth: np.ndarray, now_ns: int) -> np.ndarray:
-        """The reading; the extra mass of the tool is carried like the believed one, without its turning.
+        """The reading; the extra mass of the tool is carried like the nominal one, without its turning.
 
         Args:
             wrench: Reading without these errors, vehicle on tool, FRD [N, N m], (6,).

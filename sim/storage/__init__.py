@@ -1,1 +1,1 @@
-"""Files of the simulator: what is read from outside is bounded, what is written is complete or absent."""
+"""Files of the simulator: inputs from outside are bounded, written files are complete or absent."""

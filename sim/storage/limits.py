@@ -1,4 +1,4 @@
-"""Largest files that are read, each far above what the project writes; a larger one is a wrong or a hostile file.
+"""Largest files that are read, each far above the files of the project; a larger one is a wrong or a hostile file.
 
 Those of TOML are in `ibvs_qp.config.files`.
 """

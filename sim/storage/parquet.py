@@ -47,7 +47,7 @@ def read_parquet(file: Path) -> pl.DataFrame:
 def refuse_what_aborts(files: Sequence[Path]) -> None:
     """Decode files that this package did not write in a process of its own, before ours reads them.
 
-    Polars allocates what a damaged length says, and aborts its process where that is more than the memory.
+    Polars allocates the length of a damaged file, and aborts its process if that exceeds the memory.
 
     Raises:
         UnreadableFile: When decoding a file ended that process.

@@ -1,4 +1,4 @@
-"""Libraries in other languages that print to standard error what the caller learns by an exception anyway."""
+"""Libraries in other languages that print errors, which the caller also gets as an exception."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ Measure = Callable[[Trace], dict[str, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class FlightPlan:
-    """Everything that determines a flight to the bit."""
+    """All inputs of a bit-identical flight."""
 
     scene: Scene  # the truth
     config: PilotConfig  # the complete pilot; no preset is read later
@@ -72,4 +72,4 @@ class Block:
     name: str  # hash of its runs and of the code: the same name has the same rows
     count: int  # number of runs
     expected_s: float  # expected flying time [s]; only ratios between blocks matter
-    make: Callable[[], Iterable[Run | Refusal]]  # lists the runs in order, in the process that flies them
+    make: Callable[[], Iterable[Run | Refusal]]  # lists the runs in order, in the process of the flights

@@ -41,8 +41,8 @@ def run_sweep(
 ) -> SweepResult:
     """Fly every run of a design that is not on disk yet.
 
-    The name of a part is the hash of its runs and of the code that flies them: an interrupted sweep continues where it
-    stopped, and a changed setting or controller flies anew. Ctrl-C leaves the finished parts on disk.
+    The name of a part is the hash of its runs and of their code: an interrupted sweep continues where it
+    stopped, and flights with a changed setting or controller are flown anew. Ctrl-C leaves the finished parts on disk.
 
     Args:
         runs: The design; its order is the order of the table.

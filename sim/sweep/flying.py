@@ -10,7 +10,7 @@ from typing import Any
 
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.settings import dump_toml
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import save_log
 from sim.flight.stop import ignore_stop
@@ -53,7 +53,7 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
     Args:
         run: The run.
-        log: Folder of its log, if the run stores one; its trace goes beside it.
+        log: Folder of its log, if the run stores one; its trace goes next to it.
 
     Raises:
         KeyboardInterrupt: On Ctrl-C.
@@ -100,10 +100,10 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
 
 def outcome(trace: Trace) -> Row:
     """Whether a flight ended as planned, by the truth and by the pilot, and why it ended; a false claim has failed."""
-    judgement, claimed = Judgement(trace), bool(trace.claimed)
-    completed, reason = judgement.completed, trace.reason
+    assessment, claimed = Assessment(trace), bool(trace.claimed)
+    completed, reason = assessment.completed, trace.reason
     if completed != claimed:
-        reason = f"{FALSE_CLAIM}: {judgement.shortfall}" if claimed else f"not claimed: {reason}"
+        reason = f"{FALSE_CLAIM}: {assessment.shortfall}" if claimed else f"not claimed: {reason}"
     return {"completed": completed and claimed, "claimed": claimed, "reason": reason}
 
 

@@ -36,7 +36,7 @@ def part_file(folder: Path, name: str) -> Path:
 
 
 def write_table(file: Path, table: pl.DataFrame) -> None:
-    """Write a table so that neither a reader nor a crash sees half a file."""
+    """Write a table so that neither a reader nor a crash meets half a file."""
     with replacing(file) as stream:  # written by Python: Polars hides why the system refuses a file
         table.write_parquet(content := io.BytesIO())
         stream.write(content.getbuffer())

@@ -19,7 +19,7 @@ _SEED = 20
 
 
 def needed() -> int:
-    """Fewest values of an interval: fewer leave the sign of their median open at this confidence, whatever they are."""
+    """Fewest values of an interval: fewer leave the sign of their median open at this confidence, for any values."""
     return math.ceil(1.0 - math.log2(1.0 - CONFIDENCE))
 
 

@@ -17,7 +17,7 @@ SCENE_ROOM = 1.15
 #: Least ratio to the shipped preset's contact damping [-]: stability is worth as much as an objective.
 LEAST_DAMPING = 0.9
 #: Damping ratio as which an undamped contact counts [-]; it keeps the cost finite.
-HARDLY_DAMPED = 1e-3
+LEAST_COUNTED_DAMPING = 1e-3
 #: Slope of the cost beyond the bound of an objective: one of nine objectives must not buy room for the others [-].
 STEEP = 2.0
 #: Presets of a search that fly again, on other seeds and harder scenes, before the choice: the best of many trials is
@@ -32,7 +32,7 @@ def gain_over(score: Score, shipped: Score) -> float:
 
 
 def cost(score: Score, shipped: Score) -> float:
-    """What the search minimises: `gain_over`, and steeply more beyond the bound of an objective."""
+    """Cost of the search: `gain_over`, and steeply more beyond the bound of an objective."""
     beyond = sum(max(0.0, each) for each in _beyond(score, shipped))
     return gain_over(score, shipped) + STEEP * beyond
 
@@ -62,10 +62,10 @@ def less_damped(damping: float, shipped: float) -> float:
     """Logarithm by which a contact's damping ratio is below its bound; 0 above it.
 
     Args:
-        damping: Least damping ratio of the contact; an undamped one counts as hardly damped.
+        damping: Least damping ratio of the contact; an undamped one counts as `LEAST_COUNTED_DAMPING`.
         shipped: That of the shipped preset.
     """
-    return max(0.0, math.log(LEAST_DAMPING * shipped / max(damping, HARDLY_DAMPED)))
+    return max(0.0, math.log(LEAST_DAMPING * shipped / max(damping, LEAST_COUNTED_DAMPING)))
 
 
 def ranked(scores: Mapping[int, Score], shipped: Score) -> list[int]:

@@ -36,15 +36,15 @@ SEARCH_SEED, CHOICE_SEED, REPORT_SEED = 1000, 2000, 3000
 SEED_STRIDE = 100
 #: Force of the gusts, rms [N], and of the strong ones; slope of the sloping edge [deg].
 GUST_N, STRONG_GUST_N, SLOPE_DEG = 2.0, 3.0, 5.0
-#: Slide with the push reduced to the reach, and slide with the reach check off: friction of each, and push over what
-#: the rotors can hold [-]. For the Tarot 10 N and 16 N; 20 N, at 1.27, three of four slides go less than half way.
+#: Slide with the push reduced to the reach, and slide with the reach check off: friction of each, and push over the
+#: reach of the rotors [-]. For the Tarot 10 N and 16 N; 20 N, at 1.27, three of four slides go less than half way.
 STICKING, STICKING_PUSH = 0.8, 1.15
 SLIPPERY, SATURATING_PUSH = 0.3, 1.03
 #: Hold and slide [s].
 SLIDING = PressJob(hold_s=2.0, slide_s=4.0)
 #: Direction of the slide in B.
 LEFT = np.array([0.0, -1.0, 0.0])
-#: Starts, approaches and retreats beside the strokes [s]; sizes the progress bar only.
+#: Starts, approaches and retreats in addition to the strokes [s]; sizes the progress bar only.
 _OVERHEAD_S = 9.0
 
 
@@ -55,7 +55,7 @@ class Training:
     Attributes:
         scene: The scene.
         task: Task, which decides on job and objectives. A saturated slide has no reach check.
-        push: Push over what the rotors can hold at the scene's friction [-]; 0 for the scene's push.
+        push: Push over the reach of the rotors at the scene's friction [-]; 0 for the scene's push.
     """
 
     scene: Scene

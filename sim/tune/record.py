@@ -86,8 +86,10 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
     """Write all files; returns the JSON."""
     law, found, summary = outcome.law, outcome.scores, content(outcome, folder)
     gains = {} if outcome.chosen is None else outcome.trials[outcome.chosen][0]
-    what = "Weights of the predictive rival" if outcome.plan.subject.rival else "Gains"
-    head = f"# {what} found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; other values are as shipped."
+    subject = "Weights of the predictive rival" if outcome.plan.subject.rival else "Gains"
+    head = (
+        f"# {subject} found by `{outcome.again}`: trial {outcome.chosen} of {len(found)}; other values are as shipped."
+    )
     if outcome.chosen is None:
         head = "# As shipped: no trial of the search may replace it."
     preset = outcome.plan.subject.having(gains).to_toml()
@@ -110,7 +112,7 @@ def _finalist(each: Finalist) -> dict[str, Any]:
 
 
 def _finalists(finalists: dict[str, Finalist]) -> list[str]:
-    """Table of the finalists beside the shipped preset."""
+    """Table of the finalists and the shipped preset."""
     if not finalists:
         return []
     objectives = [each.label for each in OBJECTIVES]

@@ -21,7 +21,7 @@ from sim.tune.space import BY_HAND, RIVAL, Spans, Subject, Values, from_unit, ro
 if TYPE_CHECKING:
     import optuna
 
-#: Attributes of a trial: its objectives, its fraction of failed flights, and what its margins add to its cost.
+#: Attributes of a trial: its objectives, its fraction of failed flights, and the cost of its margins.
 VALUES, FAILED, MARGINS = "values", "failed", "margins"
 #: First deviation of CMA-ES, of the range of a value [-]: a factor of 1.3 for a logarithmic range of a decade. It
 #: starts at the best of the first trials.
@@ -47,12 +47,12 @@ class SearchPlan:
 
     @property
     def subject(self) -> Subject:
-        """What trial 0 flies."""
+        """Flights of trial 0."""
         return Subject(self.shipped, rival=self.law == RIVAL)
 
     @property
     def digest(self) -> str:
-        """Hash of what gives a trial its score: ranges, objectives, training flights and start."""
+        """Hash of the inputs of a trial's score: ranges, objectives, training flights and start."""
         parts = (self.subject.spans, OBJECTIVES, training(), start_gains(self))
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:12]
 
@@ -177,7 +177,7 @@ def _score(trial: optuna.trial.FrozenTrial) -> Score:
 
 
 def _key(values: Values) -> tuple[float, ...]:
-    """Values as flown, in alphabetical order."""
+    """Values of the flights, in alphabetical order."""
     return tuple(value for _, value in sorted(rounded(values).items()))
 
 

@@ -81,7 +81,7 @@ Spans = dict[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class Subject:
-    """What a trial flies: a preset, or the predictive rival on it."""
+    """Configuration of a trial: a preset, or the predictive rival on it."""
 
     config: PilotConfig
     rival: bool = False
@@ -89,7 +89,7 @@ class Subject:
 
     @property
     def values(self) -> Values:
-        """The present values of what is searched."""
+        """The present values of the searched settings."""
         if self.rival:
             return {name: getattr(self.weights, name) for name in self.spans}
         controller = self.config.controller

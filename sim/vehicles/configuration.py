@@ -38,7 +38,7 @@ class DerivedSetting(NamedTuple):
 
 
 def with_vehicle(config: PilotConfig, vehicle: VehicleParams) -> PilotConfig:
-    """The configuration of another vehicle; what follows from it follows, what is stated remains."""
+    """The configuration of another vehicle; derived settings follow, stated ones remain."""
     return dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
 
 

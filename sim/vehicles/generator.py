@@ -15,7 +15,8 @@ from sim.world.random_streams import stream
 ROTORS = (6, 7, 8)
 #: Ranges: all-up mass [kg], tilt [deg], radius of the circle at 6 kg [m], which grows with the cube root of the mass.
 _MASS_KG, _TILT_DEG, _CIRCLE_M = (2.0, 12.0), (15.0, 40.0), (0.42, 0.52)
-#: Propeller's share of the largest radius without overlap, thrust in all over weight, idle over full thrust [-].
+#: Propeller radius as a fraction of the largest one without overlap, thrust in all over weight, idle over full thrust
+#: [-].
 _FILL, _THRUST_RATIO, _IDLE = (0.70, 0.92), (2.2, 4.5), (0.015, 0.035)
 #: Moment per thrust over propeller radius [-]; motors' lag, rising and falling [s].
 _TORQUE, _LAG_UP_S, _LAG_DOWN_S = (0.08, 0.13), (0.03, 0.07), (0.045, 0.10)
@@ -23,7 +24,8 @@ _TORQUE, _LAG_UP_S, _LAG_DOWN_S = (0.08, 0.13), (0.03, 0.07), (0.045, 0.10)
 _AHEAD_M, _TIP_DOWN_M = (0.08, 0.30), (-0.08, 0.08)
 #: Camera: distance to the wall in contact, beside and below or above the arm [m], turn about its axis and aside [deg].
 _WALL_M, _BESIDE_M, _BELOW_M, _ASKEW_DEG = (0.35, 0.75), (-0.06, 0.06), (0.06, 0.14), (-4.0, 4.0)
-#: Row of the tip in the picture, from its upper border as a share of the height [-], and vertical field of view [deg].
+#: Row of the tip in the picture, from its upper border as a fraction of the height [-], and vertical field of view
+#: [deg].
 _TIP_ROW, _FIELD_DEG = (0.15, 0.55), (42.0, 70.0)
 #: Picture sizes [px].
 _SIZES = ((640, 480), (424, 240), (848, 480))

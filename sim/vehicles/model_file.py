@@ -33,7 +33,7 @@ _ROTOR = re.compile(r"rotor|prop", re.IGNORECASE)
 _ASSUMED_RATIO_M = 0.02
 #: A moment per thrust below this is none [m].
 _LEAST_RATIO_M = 1e-6
-#: Greatest moment that a site's force has beside its axis, as a share of the moment [-].
+#: Greatest moment that a site's force has about other axes, as a fraction of the moment [-].
 _BESIDE = 0.01
 
 
@@ -73,7 +73,7 @@ def read_model(file: Path) -> ModelVehicle:
     """
     text = read_bytes(file, LARGEST_TOML).decode("utf-8-sig", errors="replace")
     try:
-        root = ET.fromstring(text)  # nosec B314: expat limits what entities expand to, and the file's size is limited
+        root = ET.fromstring(text)  # nosec B314: expat limits the expansion of entities, and the file's size is limited
         if root.tag not in ("mujoco", "robot"):
             raise ConfigError(f"its root is <{root.tag}>; MJCF has <mujoco>, URDF <robot>")
         urdf = root.tag == "robot"

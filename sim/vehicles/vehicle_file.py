@@ -1,4 +1,4 @@
-"""A vehicle from a file: a preset or [vehicle] in TOML, PX4's parameters, MJCF or URDF, with what the file states."""
+"""A vehicle from a file: a preset or [vehicle] in TOML, PX4's parameters, MJCF or URDF, with the stated keys."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class VehicleFile:
     """A vehicle and where it comes from.
 
     Attributes:
-        vehicle: The vehicle; what the file does not state is that of the Tarot T960.
+        vehicle: The vehicle; missing keys are those of the Tarot T960.
         kind: Type of the file, for messages.
         stated: Fields of `VehicleParams` that the file states.
-        notes: What was assumed beside those.
+        notes: Further assumptions.
         preset: The whole configuration of a preset, None for a file with a vehicle alone.
     """
 
@@ -45,7 +45,7 @@ class VehicleFile:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What a flight assumes beside the file, in words; a key that TOML leaves out is the Tarot's by definition."""
+        """Assumptions of a flight in addition to the file, in words; keys missing in TOML are the Tarot's."""
         if self.kind == "TOML":
             return ()
         return (f"{self.kind} without {', '.join(self.assumed)}: those of the Tarot T960", *self.notes)

@@ -1,4 +1,4 @@
-"""What stands still in the picture from outside: wall, floor, and the board with the paint of the moment."""
+"""Static part of the picture from outside: wall, floor, and the board with the paint of the moment."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Backdrop:
 
     Attributes:
         colour: The picture at the rasterizer's size, red, green, blue 0..1, float32.
-        on_board: Share of every pixel of the finished picture that shows the board, float32.
+        on_board: Fraction of every pixel of the finished picture that shows the board, float32.
     """
 
     def __init__(self, canvas: Canvas, rasterizer: Rasterizer) -> None:

@@ -25,7 +25,7 @@ _KEY_EVERY = 5 * FRAME_RATE_HZ
 
 
 def missing_encoder() -> str | None:
-    """What to say where no video can be written; None where one can."""
+    """The message if no video can be written; None if one can."""
     if importlib.util.find_spec("av") is None:
         return "no video: it needs the package av, and nothing else does; pip install av"
     return None

@@ -40,7 +40,7 @@ class VehicleShape:
     """Surfaces of the vehicle in MuJoCo's body frame (front-left-up, origin at the assumed centre of mass)."""
 
     solid: Triangles
-    discs: Triangles  # what is drawn through
+    discs: Triangles  # translucent surfaces
     opacity: float  # of the discs 0..1
     points: np.ndarray  # corners of all parts, discs first [m], (V, 3)
     starts: np.ndarray  # first corner of every part, (P,)
@@ -141,7 +141,7 @@ def vehicle_pose(trace: Trace, vehicle: TrueVehicle, tick: int) -> np.ndarray:
 
 
 def scene_points(trace: Trace) -> np.ndarray:
-    """What a picture of the whole flight must show: board, and rotors along the way, MuJoCo's world [m], (N, 3)."""
+    """Points that a picture of the flight must show: board, and rotors along the way, MuJoCo's world [m], (N, 3)."""
     vehicle, board = flown_vehicle(trace), trace.scene.board
     corners = BoardGeometry(trace.scene).point(
         np.array([0, 1, 1, 0]) * board.width_m, np.array([0, 0, 1, 1]) * board.height_m

@@ -13,7 +13,7 @@ import numpy as np
 FIELD_DEG, AZIMUTH_DEG, ELEVATION_DEG = 32.0, 55.0, 14.0
 #: Rounds of centring; halvings of the distance; least distance of a point in front of the camera [m].
 _ROUNDS, _HALVINGS, _CLEAR_M = 4, 24, 0.2
-#: Share of the picture that everything of interest fills [-]; nearest and farthest position from its middle [m].
+#: Fraction of the picture that everything of interest fills [-]; nearest and farthest position from its middle [m].
 FILLED, NEAREST_M, FARTHEST_M = 0.92, 1.0, 9.0
 
 
@@ -22,7 +22,7 @@ class OutsideCamera:
     """A pinhole camera with upright picture, in MuJoCo's world (x into the wall, y left, z up)."""
 
     eye: np.ndarray  # position [m], (3,)
-    target: np.ndarray  # what its axis points at [m], (3,)
+    target: np.ndarray  # point on its axis [m], (3,)
     size: tuple[int, int]  # (width, height) of the picture [px]
 
     @classmethod
@@ -30,7 +30,7 @@ class OutsideCamera:
         """The nearest camera in the fixed direction that has all points in its picture.
 
         Args:
-            points: What must be visible, MuJoCo's world [m], (N, 3).
+            points: Points that must be visible, MuJoCo's world [m], (N, 3).
             size: (width, height) of the picture [px].
         """
         azimuth, elevation = math.radians(AZIMUTH_DEG), math.radians(ELEVATION_DEG)
@@ -48,7 +48,7 @@ class OutsideCamera:
 
     @classmethod
     def _nearest(cls, points: np.ndarray, target: np.ndarray, away: np.ndarray, size: tuple[int, int]) -> float:
-        """Distance at which the extent of the points in the picture is as wanted [m], by bisection."""
+        """Distance at which the extent of the points in the picture has the target value [m], by bisection."""
         near, far = NEAREST_M, FARTHEST_M
         for _ in range(_HALVINGS):
             distance = 0.5 * (near + far)

@@ -14,7 +14,7 @@ from sim.video.triangles import Triangles
 OVERSAMPLING = 2
 #: Distances between which things are drawn [m].
 NEAR_M, FAR_M = 0.2, 60.0
-#: Direction in which the light travels, MuJoCo's world; share of light from everywhere, and from there [-].
+#: Direction in which the light travels, MuJoCo's world; fraction of light from everywhere, and from there [-].
 LIGHT = np.array([0.80, -0.30, -0.52]) / np.linalg.norm((0.80, -0.30, -0.52))
 AMBIENT, DIFFUSE = 0.52, 0.56
 

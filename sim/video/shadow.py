@@ -27,7 +27,7 @@ def shadow(rasterizer: Rasterizer, outlines: Sequence[np.ndarray], opacities: Se
         opacities: Of every thing, 0..1.
 
     Returns:
-        Share of the light that is gone, float32, at the size of the finished picture.
+        Fraction of the light that is gone, float32, at the size of the finished picture.
     """
     width, height = rasterizer.camera.size
     dark = np.zeros((height, width), np.uint8)

@@ -1,6 +1,6 @@
 """Position of board and nominal strokes in the world (truth; no input of the controller).
 
-World NED with the wall to the north: x points into the wall, y to the right as the vehicle sees it, z down. The
+World NED with the wall to the north: x points into the wall, y to the right for the vehicle, z down. The
 board's face is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at
 x = gap_m. Points on the board are given as (along, up) metres from that corner, turned with the board's slope.
 """

@@ -136,7 +136,7 @@ class Canvas:
 
     @property
     def coverage(self) -> np.ndarray:
-        """Share of every pixel that is painted, float32 0..1, (height, width)."""
+        """Fraction of every pixel that is painted, float32 0..1, (height, width)."""
         self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
@@ -190,7 +190,7 @@ class Canvas:
         )
 
     def refresh(self) -> Box | None:
-        """Bring `texture` up to date with all strokes; returns what may have changed in it, or None."""
+        """Bring `texture` up to date with all strokes; returns the changed part, or None."""
         self._draw_stamps()
         box, self._dirty = self._dirty, None
         if box is None:

@@ -112,7 +112,7 @@ _ON_WALL: tuple[Painter, ...] = (_poster, _pipe, _cable)
 def clutter_board(rng: np.random.Generator, picture: np.ndarray, count: int, px_m: float) -> None:
     """Put ``count`` objects on the board's picture, none of them on its outline."""
     margin = round(BOARD_MARGIN_M * px_m)
-    inner = picture[margin:-margin, margin:-margin]  # a view: whatever sticks out is cut at the margin
+    inner = picture[margin:-margin, margin:-margin]  # a view: parts beyond the margin are cut
     for _ in range(count):
         center = rng.uniform(0.05, 0.95, 2) * (inner.shape[1], inner.shape[0])
         _ON_BOARD[rng.integers(len(_ON_BOARD))](rng, inner, center, px_m)

@@ -18,7 +18,7 @@ FLIP_COSINE = math.cos(math.radians(FLIP_DEG))
 
 #: Fastest sink at ground contact that is a touchdown [m/s]: a fall from 18 mm, which legs take; PX4 lands at 0.7 m/s.
 TOUCHDOWN_SINK_M_S = 0.6
-#: Largest tilt of a touchdown [deg]: that of a flight without a rotor, 20 degrees, and what oscillates around it. Legs
+#: Largest tilt of a touchdown [deg]: that of a flight without a rotor, 20 degrees, and the oscillation around it. Legs
 #: half as wide as the rotor circle and as high as `GROUND_CLEARANCE_M` tip over at 58 degrees.
 TOUCHDOWN_TILT_DEG = 25.0
 _TOUCHDOWN_COSINE = math.cos(math.radians(TOUCHDOWN_TILT_DEG))

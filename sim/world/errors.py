@@ -1,6 +1,6 @@
 """Errors of a real vehicle and its sensors, beyond the noise of the scene's sensors; all zero is the ideal world.
 
-Every number is a size. What a flight gets is drawn from its seed: a bias has this length and a random direction, a
+Every number is a size. The errors of a flight are drawn from its seed: a bias has this length and a random direction, a
 calibration error is normal with this standard deviation. Four profiles (`sim/world/profiles`) fill the sections.
 """
 
@@ -65,7 +65,7 @@ class ForceTorqueErrors(Checked):
     overload_n: float = setting(
         0.0, "force per axis at which the sensor saturates, 0 for never", unit="N", low=0.0, high=1e4
     )
-    tool_mass: float = _size("relative error of the believed tool mass, standard deviation", "", 0.5)
+    tool_mass: float = _size("relative error of the nominal tool mass, standard deviation", "", 0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ class BodyErrors(Checked):
     )
     inertia: float = setting(0.0, "relative error of the inertia, constant", low=-0.3, high=0.3)
     tip_m: tuple[float, float, float] = setting(
-        (0.0, 0.0, 0.0), "true minus believed position of the tip, FRD", unit="m", low=-0.05, high=0.05
+        (0.0, 0.0, 0.0), "true minus nominal position of the tip, FRD", unit="m", low=-0.05, high=0.05
     )
 
 

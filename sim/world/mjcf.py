@@ -146,7 +146,7 @@ def build_model(
         scene: Board and wall.
         vehicle: The vehicle that flies.
         steps: Physics steps in a control tick.
-        drawn: Whether to add geometry for display only; the motion is the same to the bit without it.
+        drawn: Whether to add geometry for display only; the motion is bit-identical without it.
 
     Raises:
         ConfigError: When the tool alone exceeds the vehicle's inertia.

@@ -46,17 +46,17 @@ class Plant(PlantReadings):
         landed: Whether it is over because the vehicle touched down.
         wind: The air; its mean may be changed in flight.
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
-        outer_force: Force at the true centre of mass beside that of the air, world NED [N], or None.
+        outer_force: Force at the true centre of mass in addition to that of the air, world NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
         pushes: Normal contact force at every physics step of the last tick [N], likewise.
         tick_ns: The control tick [ns].
 
     Args:
         scene: The truth.
-        vehicle: What the controller believes; the scene's section ``plant`` and its errors make the true one of it.
+        vehicle: Nominal vehicle of the controller; the scene's section ``plant`` and its errors make it the true one.
         seed: Varies start pose, gusts and errors.
         tick_s: Control tick, a whole number of physics steps [s].
-        drawn: Whether the model holds the geometry that a window shows; the motion is the same to the bit.
+        drawn: Whether the model holds the geometry that a window shows; the motion is bit-identical.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Plant(PlantReadings):
             (data.qpos, data.qvel, data.history, points),
             (self.truth, self.pushes),
         )
-        self._wanted, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
+        self._commanded, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
         self.gain = np.array(np.broadcast_to(truth.thrust_gain, model.nu), float)
         self._lag = model.actuator_dynprm[:, 0]
         lags = np.array((truth.motor_lag_up_s, truth.motor_lag_down_s))
@@ -108,7 +108,7 @@ class Plant(PlantReadings):
         arm = centre - FLIP * model.body_ipos[ids.vehicle]
         self._drive = BoundFunction(
             drive(model.nu),
-            (self._wanted, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
+            (self._commanded, self._lower, self._upper, data.act, lags, self._air, self.truth[PLACES["rotation"]], arm),
             (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
         )
 
@@ -132,8 +132,8 @@ class Plant(PlantReadings):
         if self.crashed == NOT_FINITE or not math.isfinite(sum(thrusts.tolist())):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + self.tick_ns
             return
-        wanted = thrusts * self.gain
-        self._wanted[:] = wanted if self._factors is None else wanted * self._factors.next()
+        commanded = thrusts * self.gain
+        self._commanded[:] = commanded if self._factors is None else commanded * self._factors.next()
         self._air[:] = self.wind.force(self._centre_velocity.tolist())
         if self.outer_force is not None:
             self._air += self.outer_force
@@ -152,7 +152,7 @@ class Plant(PlantReadings):
 
     @property
     def on_board(self) -> bool:
-        """Whether the tip lies inside the board's outline; beside it the wall takes the push."""
+        """Whether the tip lies inside the board's outline; outside it the wall takes the push."""
         return self._face.on_board
 
     @property

@@ -1,4 +1,4 @@
-"""The section ``[plant]`` of a scene: the vehicle that flies, where it differs from the one the controller believes."""
+"""The section ``[plant]`` of a scene: differences of the true vehicle from the nominal one of the controller."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class PlantScene:
-    """The true vehicle; no input of the controller. A key that is not given is as the controller believes.
+    """The true vehicle; no input of the controller. A missing key has the nominal value.
 
     Positions FRD from the assumed centre of mass. ``geometry`` has the keys of a preset's vehicle: the true rotors, as
-    many as the believed ones, on a circle or each with a position, an axis and a torque ratio of its own.
+    many as the nominal ones, on a circle or each with a position, an axis and a torque ratio of its own.
     """
 
     geometry: RotorGeometry | None = None

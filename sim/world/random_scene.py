@@ -19,7 +19,7 @@ from sim.world.scene import Color, Scene
 
 #: Families of scenes. Texture seeds of the first are even, of the second odd: no scene belongs to both.
 TUNING, EVALUATION = FAMILIES = ("tuning", "evaluation")
-#: Number of texture seeds of a family; twice as many are within what a scene allows [-].
+#: Number of texture seeds of a family; a scene allows twice as many [-].
 TEXTURES = 2**30
 #: Least distance of two of the colours of board, wall and paint [grey levels, RGB norm]: that of board and wall in the
 #: scene low_contrast is 83; twice the gate of 42 within which vision takes a colour for the board's or the paint's.
@@ -68,7 +68,7 @@ RANGES = {
 SPARE = Range(
     low=0.0, high=0.08, unit="m", reason="a row ends at the margin on the left and begins freely on the right"
 )
-#: True over believed mass of the vehicle [-].
+#: True over nominal mass of the vehicle [-].
 MASS = Range(low=0.95, high=1.05, reason="another battery, a fuller brush; 0.3 kg of 6 kg")
 
 

@@ -27,7 +27,7 @@ def _steiner(mass: float, offset: np.ndarray) -> np.ndarray:
 
 
 def tool_body(vehicle: VehicleParams) -> RigidBody:
-    """The tool: a slender rod from the force/torque sensor to the tip, mass centred where the parameters say."""
+    """The tool: a slender rod from the force/torque sensor to the tip, centre of mass by the parameters."""
     rod = np.asarray(vehicle.tip_position_m) - np.asarray(vehicle.force_torque_position_m)
     return RigidBody(
         vehicle.tool_mass_kg, np.array(vehicle.tool_position_m), _steiner(vehicle.tool_mass_kg / 12.0, rod)

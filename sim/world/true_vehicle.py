@@ -1,4 +1,4 @@
-"""The vehicle that flies: what the controller believes, what ``[plant]`` states instead, and the errors of a seed."""
+"""The true vehicle: the nominal one of the controller, changed by ``[plant]`` and by the errors of a seed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sim.world.slow_noise import random_direction
 
 @dataclass(frozen=True, kw_only=True)
 class TrueVehicle(VehicleParams):
-    """Parameters of the plant: those that a controller can believe, and those that it takes for zero or one.
+    """Parameters of the plant: those with a nominal value, and those that the controller takes for zero or one.
 
     Attributes:
         com_offset_m: True centre of mass from the body origin, which is the assumed one, FRD [m].
@@ -40,22 +40,22 @@ class TrueVehicle(VehicleParams):
             raise out_of_range("thrust_gain", gain, "", f"one number or {count} (one per rotor)")
 
 
-def true_vehicle(scene: Scene, believed: VehicleParams, seed: int = 0) -> TrueVehicle:
+def true_vehicle(scene: Scene, nominal: VehicleParams, seed: int = 0) -> TrueVehicle:
     """The vehicle that flies in a scene.
 
     Args:
-        scene: Its section ``plant`` states what differs, ``errors`` the sizes of what is drawn.
-        believed: What the controller believes.
+        scene: Its section ``plant`` states the differences, ``errors`` the sizes of the drawn ones.
+        nominal: Vehicle of the controller.
         seed: Draws signs and directions of the errors.
 
     Raises:
-        ConfigError: When the plant's rotors are not as many as the believed ones, or its values do not go together.
+        ConfigError: When the plant's rotors are not as many as the nominal ones, or its values do not go together.
     """
     plant = scene.plant
-    if plant.geometry is not None and plant.geometry.count != believed.geometry.count:
-        rotors, needed = plant.geometry.count, believed.geometry.count
+    if plant.geometry is not None and plant.geometry.count != nominal.geometry.count:
+        rotors, needed = plant.geometry.count, nominal.geometry.count
         raise out_of_range("plant.geometry", rotors, "rotors", f"the controller commands {needed}")
-    values = {field.name: getattr(believed, field.name) for field in dataclasses.fields(VehicleParams)}
+    values = {field.name: getattr(nominal, field.name) for field in dataclasses.fields(VehicleParams)}
     values |= {
         field.name: value for field in dataclasses.fields(plant) if (value := getattr(plant, field.name)) is not None
     }

@@ -63,7 +63,7 @@ static void wrench_of(const ibvs_real u[IBVS_ROTORS], ibvs_real wrench[6]) {
 static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real thrusts[IBVS_ROTORS], bool limited,
                    ibvs_command *command) {
   ibvs_real beyond[IBVS_ROTORS];
-  c->given_up = 0;
+  c->unallocated = 0;
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
     command->thrusts[i] = thrusts[i];
     beyond[i] = limited ? free[i] - thrusts[i] : 0;
@@ -74,7 +74,7 @@ static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real th
   wrench_of(thrusts, command->wrench);
   wrench_of(beyond, command->unallocated_wrench);
   for (uint32_t i = 0; i < 6; ++i) {
-    c->given_up = r_fmax(c->given_up, r_fabs(command->unallocated_wrench[i]));
+    c->unallocated = r_fmax(c->unallocated, r_fabs(command->unallocated_wrench[i]));
   }
 }
 

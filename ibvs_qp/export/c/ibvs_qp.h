@@ -140,7 +140,7 @@ typedef struct {
   ibvs_program program;
   bool commanded;
   int32_t recovery;
-  ibvs_real thrusts[IBVS_ROTORS], change[IBVS_ROTORS], given_up;
+  ibvs_real thrusts[IBVS_ROTORS], change[IBVS_ROTORS], unallocated;
 } ibvs_controller;
 
 /* Size of an instance [bytes], for callers that do not compile against this header. */

@@ -121,7 +121,7 @@ static void pack_rotors(ibvs_controller *c, const ibvs_measurement *m) {
     in[IBVS_IN_THRUST_CEILING + i] = ceiling;
   }
   in[IBVS_IN_COMMANDED] = c->commanded ? 1 : 0;
-  in[IBVS_IN_GIVEN_UP] = c->given_up;
+  in[IBVS_IN_UNALLOCATED] = c->unallocated;
   in[IBVS_IN_THRUST_STEP] = c->commanded ? IBVS_RATE_STEP : IBVS_ANY_STEP;
 }
 

@@ -19,7 +19,7 @@ static bool accept_stamp(ibvs_controller *c, int64_t stamp) {
     c->shift_ns = stamp >= IBVS_STAMP_END / 2 ? -stamp : 0;
   }
   const int64_t time = stamp + c->shift_ns;
-  if (c->last_ns < 0 || (time > c->last_ns && time - c->last_ns <= IBVS_LEAP_NS)) {
+  if (c->last_ns < 0 || (time > c->last_ns && time - c->last_ns <= IBVS_JUMP_NS)) {
     c->last_ns = time;
     c->odd_count = 0;
     return true;
@@ -28,7 +28,7 @@ static bool accept_stamp(ibvs_controller *c, int64_t stamp) {
   if (c->odd_count > 0 && stamp == c->odd_last) {
     return false;
   }
-  const bool follows = c->odd_count > 0 && stamp > c->odd_last && stamp - c->odd_last <= IBVS_LEAP_NS;
+  const bool follows = c->odd_count > 0 && stamp > c->odd_last && stamp - c->odd_last <= IBVS_JUMP_NS;
   if (!follows) {
     c->odd_first = stamp;
     c->odd_count = 0;

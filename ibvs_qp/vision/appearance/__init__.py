@@ -1,1 +1,1 @@
-"""What board and paint look like, in the light that falls on them."""
+"""Appearance of board and paint, in the light that falls on them."""

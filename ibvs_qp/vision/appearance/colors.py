@@ -1,4 +1,4 @@
-"""What the surface looks like: the board's colour, sampled where it is, and the paint's, known to the strategy."""
+"""Appearance of the surface: the board's colour, sampled where it is, and the paint's, known to the strategy."""
 
 from __future__ import annotations
 
@@ -157,11 +157,11 @@ class SurfaceColors:
         return self._tables.of(self.board, self.paint if self.paint_distinct else None, steps)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
-        """Labels of samples by the colour around a seed: BOARD for what looks like it, uint8 (rows, columns)."""
+        """Labels of samples by the colour around a seed: BOARD for similar ones, uint8 (rows, columns)."""
         return self.like(colors, _around(grid, colors, [seed], radius)[0])
 
     def like(self, colors: np.ndarray, color: np.ndarray) -> np.ndarray:
-        """Labels of colours uint8 (..., 3): BOARD for what looks like one (3,), uint8 (...)."""
+        """Labels of colours uint8 (..., 3): BOARD for those similar to one (3,), uint8 (...)."""
         color = np.ascontiguousarray(color, np.float32)
         paint = UNKNOWN if self.paint is None or _apart(self.paint, color) <= self._gate**2 else self.paint
         samples = np.ascontiguousarray(colors).reshape(-1, 3)

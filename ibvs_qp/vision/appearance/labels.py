@@ -1,4 +1,4 @@
-"""Labels of colours: tables of what every colour means in every level of light.
+"""Labels of colours: tables of the label of every colour at every level of light.
 
 A table has the label of all colours in steps of eight grey levels, red first; tables of several levels of light follow
 one another. An empty array of levels stands for even light.
@@ -69,7 +69,7 @@ def _squared_distance(red: float, green: float, blue: float, reference: np.ndarr
 
 @kernel("u1[::1](u1[:, ::1], f4[::1], f4[::1], f8)")
 def like_colors(colors: np.ndarray, board: np.ndarray, paint: np.ndarray, gate: float) -> np.ndarray:
-    """Labels of colours (n, 3) by what is within the gate of the board's, else of the paint's [grey levels], (n,)."""
+    """Labels of colours (n, 3) within the gate of the board's, else of the paint's [grey levels], (n,)."""
     labels, gate_squared = np.empty(len(colors), np.uint8), np.float32(gate * gate)
     for i in range(len(colors)):
         red, green, blue = np.float32(colors[i, 0]), np.float32(colors[i, 1]), np.float32(colors[i, 2])
@@ -81,7 +81,7 @@ def like_colors(colors: np.ndarray, board: np.ndarray, paint: np.ndarray, gate: 
 
 @kernel("u1[::1](f4[::1], f4[::1], f8)")
 def _label_table(board: np.ndarray, paint: np.ndarray, gate: float) -> np.ndarray:
-    """One table: what is within the gate of the paint [grey levels] and not nearer to the board is paint."""
+    """One table: colours within the gate of the paint [grey levels] and not nearer to the board are paint."""
     table, gate_squared = np.empty((_SIDE, _SIDE, _SIDE), np.uint8), np.float32(gate * gate)
     center = np.arange(_SIDE).astype(np.float32) * np.float32(8.0) + np.float32(4.0)
     for red in range(_SIDE):
@@ -114,7 +114,7 @@ class LabelTables:
 
         Args:
             board: Colour of the board in the light of the reference, (3,).
-            paint: The same of the paint, or None where it cannot be told from the board.
+            paint: The same of the paint, or None where it looks like the board.
             steps: Logarithm of the light of every level, in steps of `LIGHT_STEP`.
         """
         if _differ(paint, self._paint) or _differ(board, self._board):

@@ -21,23 +21,23 @@ _UNEVEN = 0.10
 _BOARD_TINT = 0.7
 #: A channel this high is cut off, it shows neither light nor tint; and the highest there is [grey levels].
 _CUT, _WHITE = 250, np.float32(255.0)
-#: Light is uneven only where one level leaves out this fraction of what has the surface's tint.
+#: Light is uneven only where one level leaves out this fraction of the samples with the surface's tint.
 _LEFT_OUT = 0.02
 #: Least samples of the light.
 _LEAST = 40
 #: Light is held between these levels [steps]: 0.4 to 2.5 times the light of the reference.
 _LEVELS = 30
-#: A field that is already known is kept down to this difference of light, less than what makes a new one [ln].
+#: A field that is already known is kept down to this difference of light, less than for a new one [ln].
 _KEPT = 0.07
 #: Rounds in which the field grows from where it is known: each reaches as far again as the gate allows.
 _ROUNDS, _ROUNDS_KNOWN = 8, 2
 #: Pull of the field's coefficients to zero, as variances of its terms: a band of the surface shows a slope, only much
 #: of it a curvature.
 _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
-#: What a field may leave of what two materials in even light leave, see `_left_by_two_materials`. Light on a board
-#: leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board beside a grey
-#: wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board 0.7 at least.
-#: Taken for light a step costs the edge.
+#: Largest residual of a field, as a fraction of that of two materials in even light, see `_left_by_two_materials`.
+#: Light on a board leaves 0.1 to 0.35 of it, up to 0.6 on a dark one, whose gate holds that light anyway; a grey board
+#: next to a grey wall is a step, which no polynomial follows, and leaves 0.6 to 2.9, in flights before the faint board
+#: 0.7 at least. Taken for light a step costs the edge.
 _UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
@@ -48,14 +48,14 @@ class LightField:
     """Light over the picture, relative to a reference: exp of a quadratic polynomial of the place."""
 
     terms: np.ndarray  # coefficients of 1, x, y, x^2, x y, y^2 of normalised places over `reach`, (6,)
-    range: tuple[float, float]  # least and greatest logarithm of the light, by what was seen
+    range: tuple[float, float]  # least and greatest logarithm of the light in the samples
     reach: float  # largest normalised coordinate of the picture
     shape: tuple[int, int]  # (height, width) of the picture [px]
     intrinsics: Intrinsics  # (fx, fy, cx, cy) [px]
 
     @cached_property
     def levels(self) -> np.ndarray:
-        """Level of light in every cell, from 0 for the darkest, uint8 (rows, columns), rows one after the other."""
+        """Level of light in every cell, from 0 for the darkest, uint8 (rows, columns), row by row."""
         steps = self._steps
         return np.ascontiguousarray(steps - steps.min(), np.uint8)
 
@@ -105,8 +105,8 @@ def fit_light(
 ) -> tuple[LightField, np.ndarray] | None:
     """How the light falls on the surface, grown from where the surface's colour is known.
 
-    The logarithm of a sample's light is fitted by a quadratic polynomial to the samples within the gate of what the
-    polynomial of the round before expects.
+    The logarithm of a sample's light is fitted by a quadratic polynomial to the samples within the gate of the
+    prediction by the polynomial of the round before.
 
     Args:
         colors: Samples on the surface by depth, RGB (n, 3).
@@ -136,7 +136,7 @@ def fit_light(
     for _ in range(_ROUNDS if before is None else _ROUNDS_KNOWN):
         gain = np.exp(expected).astype(np.float32)
         near = _distances(colors, board, gain) < (gate * gain) ** 2
-        # what is cut off is at least as bright as it looks: it counts only where less was expected
+        # a saturated sample is at least as bright as it looks: it counts only where less was expected
         counted, previous = near & (~cut | (expected < logarithm)), counted
         if int(np.count_nonzero(counted)) < _LEAST:
             return None
@@ -192,7 +192,7 @@ def light_of(
 
 
 def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
-    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, whatever their colour.
+    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, of any colour.
 
     The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
     """

@@ -80,7 +80,7 @@ def surface_motion(
     plane: PlaneEstimate,
     intrinsics: Intrinsics,
 ) -> CameraMotion | None:
-    """Motion of the camera by the points of a plane it sees, or None where too few of them can be followed.
+    """Motion of the camera by the points of a plane in view, or None where too few of them can be followed.
 
     Args:
         before: Brightness of the picture before, uint8 (h, w).
@@ -90,8 +90,8 @@ def surface_motion(
         plane: Its plane there, which gives the points their depth.
         intrinsics: (fx, fy, cx, cy) of the full picture [px].
     """
-    wanted = cv2.resize(cells.astype(np.uint8), before.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    corners = cv2.goodFeaturesToTrack(before, _POINTS, _QUALITY, _SPACING, mask=wanted)
+    mask = cv2.resize(cells.astype(np.uint8), before.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    corners = cv2.goodFeaturesToTrack(before, _POINTS, _QUALITY, _SPACING, mask=mask)
     if corners is None or len(corners) < _LEAST:
         return None
     corners, search = np.asarray(corners, np.float32).reshape(-1, 1, 2), {"winSize": _WINDOW, "maxLevel": _LEVELS}

@@ -1,4 +1,4 @@
-"""Velocity from sparse optical flow, depth and gyro, with a covariance that is large where nothing was seen."""
+"""Velocity from sparse optical flow, depth and gyro, with a covariance that is large without visible features."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class SparseFlow:
             busy: Whether the renewal of live points shall wait for the next picture: this one has cost much.
 
         Returns:
-            The velocity, or the reason why there is none.
+            The velocity, or the reason why it is missing.
         """
         config, half, before = self._config, half_resolution(frame.intrinsics), self._grey
         rows, columns = frame.rgb.shape[0] // 2, frame.rgb.shape[1] // 2
@@ -133,7 +133,7 @@ class SparseFlow:
         still = _unturned(self._bearings, motion.rotation)
         velocity = np.zeros(3) if self._velocity is None else self._velocity
         start = expected_points(still, self._inverse, velocity, interval, half)
-        near = np.abs(start - self._points) < _FAR * grey.shape[1]  # false for what is not a number
+        near = np.abs(start - self._points) < _FAR * grey.shape[1]  # false for NaN
         start = start if near.all() else np.where(near, start, self._points)
         self._points, status = self._search(last, grey, start, self._velocity is not None)
         height, width = grey.shape

@@ -56,7 +56,7 @@ def solve_velocity(
         config: Settings.
 
     Returns:
-        The velocity, or the reason why there is none.
+        The velocity, or the reason why it is missing.
     """
     prior = 1.0 / config.prior_m_s**2
     velocity, sums, square, total, agreeing = _robust_velocity(

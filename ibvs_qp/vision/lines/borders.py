@@ -23,7 +23,7 @@ _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
 _CELLS_BESIDE, _PLACES_BESIDE, _MOSTLY = 1.5, 16, 0.75
 #: Places looked at along a line.
 PLACES = 32
-#: Length that earns half of what a long line earns [px at 640].
+#: Length with half the score of a long line [px at 640].
 _HALF_LENGTH_PX = 12.0
 #: A border this long, as a fraction of the surface's size along it, earns all.
 _FULL_SHARE = 0.2
@@ -32,13 +32,14 @@ _UNSEEN, _ON, _FARTHER, _NEARER = 0, 1, 2, 3
 #: Distances within which the surface must be seen on its own side, beyond which it must not be, and within which it
 #: goes on, as places in the list of distances.
 _SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM = 5, 5, 1, 4, 2
-#: Colours on both sides nearer than this are one; beside the bare surface, what goes on is as near to it [grey levels].
+#: Colours on both sides nearer than this are one; next to the bare surface, a continuation is as near to it [grey
+#: levels].
 _CONTRAST, _SAME_COLOR = 16.0, 24.0
 #: Colours this near to the paint's are paint [grey levels]: less than the gate of the labels, for no depth confirms it.
 _SAME_PAINT = 30.0
 #: Of the places beyond a line at which colour is read, this many must be the surface's for it to go on.
 _MOST = 2
-#: A border that only colour shows counts this much, and what depth shows where colour does not agree.
+#: A border that only colour shows counts this much, and one that depth shows against the colour.
 _COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
 #: Least fraction of the places along a line that nothing hides.
 _LEAST_SHARE = 0.15
@@ -211,7 +212,7 @@ def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, c
             continue
         if not inside[d] or not is_alike(outer_colors[d, 0], outer_colors[d, 1], outer_colors[d, 2], color):
             continue
-        # beside the bare surface the light is known, and what goes on must have its very colour
+        # next to the bare surface the light is known, and a continuation must have the same colour
         if bare and _apart(outer_colors[d], inner_colors[0]) >= _SAME_COLOR * _SAME_COLOR:
             continue
         like += 1
@@ -250,10 +251,10 @@ def _middle(one, two, three):
 
 
 @inner
-def _any(states, first, last, wanted):
-    """Whether one of the states is the wanted one."""
+def _any(states, first, last, value):
+    """Whether one of the states is the requested one."""
     for d in range(first, last):
-        if states[d] == wanted:
+        if states[d] == value:
             return True
     return False
 

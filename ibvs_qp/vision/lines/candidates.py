@@ -26,7 +26,7 @@ _SAME_PX, _KNOWN_PX = 2.5, 8.0
 _PAINT_PX, _ACROSS = 6.0, 20.0
 #: A longer line on an edge is taken if its further part has this fraction of the better one's score.
 _FURTHER_SHARE = 0.5
-#: Score from which a line is said to border the surface.
+#: Score from which a line counts as a border of the surface.
 BORDER = 0.2
 #: A segment of a lower score before it is fitted will be no border after that.
 _HOPELESS = 0.05
@@ -53,7 +53,7 @@ _CONSTANT, _SCORE, _COLOR = -9.5, 11.0, 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A detected line, and what it is."""
+    """A detected line, and its kind."""
 
     line: RefinedLine  # the fitted line
     pixels: np.ndarray  # its visible end points [px], (2, 2)

@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.lines.edges import find_edges, look_again, preferences
 from ibvs_qp.vision.lines.records import LINES, PIXELS, QUERIES, SEARCH, VIEW, Strip
-from ibvs_qp.vision.lines.strips import clamped, find_admissible, gather, new_step
+from ibvs_qp.vision.lines.strips import clamped, find_admissible, gather, typical_step
 from ibvs_qp.vision.lines.views import Fit, Run, finish, place_in_view
 from ibvs_qp.vision.medians import MAD_TO_SIGMA, upper_median
 
@@ -105,7 +105,7 @@ def _find(pixels, query, view, search, strip, preference, allowed, answers):
     for c in range(3):
         direction[c] = view.step[c]
     if not query.known:
-        new_step(strip.colors, allowed, side, int(view.polarity), direction)
+        typical_step(strip.colors, allowed, side, int(view.polarity), direction)
     norm = math.sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2])
     for c in range(3):
         unit[c] = np.float32(0.5) * np.float32(direction[c] / max(norm, _STEP_MIN))

@@ -45,15 +45,15 @@ class TrackState:
         segment: Visible end points, normalised, (2, 2).
         ends: Why it ends there: "picture", "mask", "span" or "end" (it really ends).
         weight: 0..1.
-        confirmed: Whether it was seen often enough.
-        seen: Whether it was seen in this very picture.
+        confirmed: Whether it was detected often enough.
+        seen: Whether it was detected in this picture.
         age: Frames since its start.
         inlier_share: Fraction of profiles that agree.
         rms_px: Residual [px].
         length_px: Length of the segment [px].
         score: 0..1, ranks the tracks of one picture; 1 for a hint.
         confidence: 0..1, fraction of such lines that are of this kind; it falls while the line is not seen.
-        borders_plane: Whether depth said that the surface ends there.
+        borders_plane: Whether the surface ends there by depth.
         hint: Name of the hint it answers, or "".
     """
 

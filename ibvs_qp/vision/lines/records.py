@@ -1,4 +1,4 @@
-"""What kernels of the line fit read and write: predicted lines, the same in their views, fitted lines, and pixels."""
+"""Records of the kernels of the line fit: predicted lines, the same in their views, fitted lines, and pixels."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Strip(NamedTuple):
     predicted: np.ndarray  # predicted rows [px], (K,)
     base: np.ndarray  # the same in whole pixels, (K,)
     row: np.ndarray  # rows of the edges [px], (K,)
-    distance: np.ndarray  # of the edges from what most of them agree with [px], (K,)
+    distance: np.ndarray  # of the edges from their consensus [px], (K,)
 
 
 _U1, _F8, _I8 = nb.u1, nb.f8, nb.i8

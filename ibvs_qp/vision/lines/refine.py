@@ -34,9 +34,9 @@ class LineQuery:
     polarity: int = 0  # +1 or -1 if a new line's colours rise or fall along the normal, 0 if unknown
     # normalised range along x (level lines) or y (upright ones) to look at, or None for the whole picture
     span: tuple[float, float] | None = None
-    # the same kind of range in which it was seen last, or None: most of what is visible there must show it
+    # the same kind of range in which it was seen last, or None: most of the visible part there must show it
     extent: tuple[float, float] | None = None
-    kind: str = ""  # "board", "paint" or "": what the two sides must look like
+    kind: str = ""  # "board", "paint" or "": appearance of the two sides
     surface_side: int = 0  # side of the working surface along the normal
 
     def record(self, colors: SurfaceColors) -> tuple[object, ...]:

@@ -111,7 +111,7 @@ def fit_segments(
         config: Settings of the fit.
         colors: Of the surface.
         beyond: Fraction of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
-        contents: Whether the colours of both sides are wanted.
+        contents: Whether the colours of both sides are returned.
         half_width_px: Half width of the strips; 4 px at 640 unless given.
 
     Returns:
@@ -157,10 +157,10 @@ def find_segments(
         small: The picture, uint8 (h, w, 3).
         mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
         factor: Pixels at full resolution per pixel of the picture.
-        region: Cells in which segments are wanted, bool.
+        region: Cells in which segments are searched, bool.
         rows: Row of cells of every row of the picture, (h,).
         columns: The same of its columns, (w,).
-        normals: Directions of the normals that are wanted, by whole degrees, bool (360,).
+        normals: Directions of the normals to search, by whole degrees, bool (360,).
         shortest: Least length [px].
 
     Returns:
@@ -253,7 +253,7 @@ def _edge_points(small, mask, factor, region, row_of, column_of):
 
 
 @kernel("i4[:, ::1](f8[:, ::1], i8[::1], b1[::1], f8[:, ::1], i8)")
-def _votes(points, first, wanted, normals, reach):
+def _votes(points, first, chosen, normals, reach):
     """Votes for lines by the degree of their normal and distance from the middle plus reach, (360, 2 reach + 1)."""
     votes = np.zeros((_ANGLES, 2 * reach + 1), np.int32)
     for degree in range(_ANGLES):
@@ -261,7 +261,7 @@ def _votes(points, first, wanted, normals, reach):
             weight = 2 if points[i, 4] > 2.0 * _GRADIENT else 1
             for turn in range(-_VOTES_WITHIN, _VOTES_WITHIN + 1):
                 k = (degree + turn) % _ANGLES
-                if wanted[k]:
+                if chosen[k]:
                     away = points[i, 0] * normals[0, k] + points[i, 1] * normals[1, k]
                     votes[k, int(away + reach + 0.5)] += weight
     return votes

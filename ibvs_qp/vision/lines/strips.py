@@ -16,13 +16,13 @@ from ibvs_qp.vision.medians import upper_median
 _OFF_FAR, _OFF_OWN = 0.018, 0.08
 #: Turns a gradient's peak into the size of the step: a blur of 0.7 px leaves 0.4 of it.
 _PEAK_TO_STEP = np.float32(2.5)
-#: Profiles that tell the step: gradients above this fraction of the median one.
-_TELLING = np.float32(0.5)
+#: Profiles that define the step: gradients above this fraction of the median one.
+_CLEAR = np.float32(0.5)
 
 
 @inner
 def clamped(value, lowest, highest):
-    """Whole number within limits, the lowest one if the value is none."""
+    """Whole number within limits, the lowest one if the value is not a number."""
     if value >= highest:
         return highest
     return int(value) if value > lowest else lowest
@@ -93,8 +93,8 @@ def find_admissible(pixels, view, demand, strip, side, allowed):
 
 
 @inner
-def new_step(colors, allowed, side, polarity, direction):
-    """Fill in the typical strongest colour step along +v of a strip [grey levels], (3,); zero if nothing tells it."""
+def typical_step(colors, allowed, side, polarity, direction):
+    """Fill in the typical strongest colour step along +v of a strip [grey levels], (3,); zero without a clear one."""
     profiles = len(colors)
     weights, values, steps = np.empty(profiles, np.float32), np.empty(profiles), np.empty((profiles, 3), np.float32)
     for k in range(profiles):
@@ -103,7 +103,7 @@ def new_step(colors, allowed, side, polarity, direction):
         values[k] = weights[k]
         for c in range(3):
             steps[k, c] = gradient(colors, k, 3 * (best + side) + c)
-    least = _TELLING * np.float32(upper_median(values, profiles))
+    least = _CLEAR * np.float32(upper_median(values, profiles))
     for c in range(3):
         count = 0
         for k in range(profiles):

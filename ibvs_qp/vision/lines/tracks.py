@@ -83,7 +83,7 @@ class Track:
 
     @property
     def settled(self) -> bool:
-        """Whether it is followed in this picture and a detection could add nothing to what is known of it."""
+        """Whether it is followed in this picture and a detection could add no knowledge of it."""
         return self.confirmed and self.lost_s == 0.0 and (self.borders_plane or self.kind == "paint")
 
     @property
@@ -95,13 +95,13 @@ class Track:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Range along x or y in which it is searched: somewhat beyond what was seen last, normalised."""
+        """Range along x or y in which it is searched: somewhat beyond the range of the last detection, normalised."""
         first, last = self.extent
         more = max(_BEYOND * (last - first), _AT_LEAST)
         return first - more, last + more
 
     def blend(self, found: Candidate) -> None:
-        """Blend in what its two sides show in a picture."""
+        """Blend in the appearance of its two sides in a picture."""
         self.score += _SCORE_BLEND * (found.score - self.score)
         self.confidence += _SCORE_BLEND * (found.confidence - self.confidence)
         self.borders_plane = self.borders_plane or found.borders_plane
@@ -114,7 +114,7 @@ class Track:
         self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
 
     def become(self, other: Track) -> None:
-        """Be what another track on the same edge is; the identity and the line stay."""
+        """Take over the kind of another track on the same edge; the identity and the line stay."""
         self.kind, self.borders_plane, self.confidence = other.kind, other.borders_plane, other.confidence
         self.surface_side = other.surface_side if math.cos(self.theta - other.theta) > 0.0 else -other.surface_side
 
@@ -146,7 +146,7 @@ class Track:
 
 
 def _leaves(track: Track, picture: Picture) -> bool:
-    """Whether all that was seen of a line lies along the picture's border, or beyond it."""
+    """Whether the visible part of a line lies along the picture's border, or beyond it."""
     (height, width), (fx, fy, cx, cy), least = picture.mask.shape, picture.intrinsics, _BORDER_PX * picture.scale
     cos, sin = math.cos(track.theta), math.sin(track.theta)
     level = abs(sin) >= abs(cos)
@@ -226,7 +226,7 @@ class LineTracker:
         self._merge(picture, colors)
 
     def offer(self, candidates: list[Candidate], picture: Picture) -> None:
-        """Start tracks from detected lines that nothing follows yet; refresh what is known of the others."""
+        """Start tracks from detected lines that nothing follows yet; refresh the others."""
         for candidate in candidates:
             if not candidate.kind or candidate.score < self._config.detect.min_score:
                 continue
@@ -240,7 +240,7 @@ class LineTracker:
                 same.adopt(candidate.line)
 
     def rescore(self, picture: Picture, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None) -> None:
-        """Score anew what the lines seen in this picture border."""
+        """Update the border scores of the lines detected in this picture."""
         seen = [track for track in self.tracks if track.lost_s == 0.0 and track.kind == "board"]
         lines = [track.line for track in seen]
         for track, found in zip(seen, classify_lines(lines, picture, surface, colors, tilt), strict=True):
@@ -306,7 +306,7 @@ class LineTracker:
         ]
 
     def _merge(self, picture: Picture, colors: SurfaceColors) -> None:
-        """Of two tracks on one edge the older stays; without distinct colours it becomes what a caller expects."""
+        """Of two tracks on one edge the older stays; without distinct colours it takes the expected kind."""
         kept: list[Track] = []
         for track in self.tracks:
             twin = next((other for other in kept if self._same(other, track, picture)), None)

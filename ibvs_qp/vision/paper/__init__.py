@@ -1,4 +1,4 @@
-"""The paper's vision pipeline, the named baseline beside the own perception."""
+"""The paper's vision pipeline, the named baseline of the own perception."""
 
 from ibvs_qp.lazy import public_names
 

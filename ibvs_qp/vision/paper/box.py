@@ -12,9 +12,9 @@ from ibvs_qp.vision.paper.normals import NormalImage
 
 #: Changed normals in a row that end the surface; one alone is noise.
 _IN_A_ROW = 2
-#: Rays that must agree on a side, as a number, and as a share of those that ended there.
+#: Rays that must agree on a side, as a number, and as a fraction of those that ended there.
 _VOTES, _MOST = 3, 0.5
-#: Share of readings in the seed's window, and on the surface, that must exist.
+#: Fraction of readings in the seed's window, and on the surface, that must exist.
 _VALID = 0.25
 #: Normals in the box are averaged over a grid of about this many columns.
 _COLUMNS = 80
@@ -35,8 +35,8 @@ class SurfaceBox:
         distance_m: Distance of the camera centre from the surface [m].
         normal_sigma: Standard deviation of the mean normal per axis [rad].
         distance_sigma_m: Standard deviation of the distance [m].
-        inlier_share: Share of the readings in the box that have the surface's normal.
-        residual_sigma: Spread of the readings about the plane, share of depth.
+        inlier_share: Fraction of the readings in the box that have the surface's normal.
+        residual_sigma: Spread of the readings about the plane, fraction of depth.
     """
 
     left: float
@@ -86,7 +86,7 @@ class BoxSearch:
         self._first, self._last = rim, (rows - 1 - rim, columns - 1 - rim)
 
     def search(self, seed_pixel: tuple[float, float]) -> SurfaceBox | str:
-        """Find the box around the surface on which a pixel lies, or say why there is none."""
+        """Find the box around the surface on which a pixel lies, or return why it is missing."""
         stride = self._normals.stride
         if not (math.isfinite(seed_pixel[0]) and math.isfinite(seed_pixel[1])):
             return f"seed pixel {seed_pixel} is no place in a picture"
@@ -131,7 +131,7 @@ class BoxSearch:
         step = np.argmax(lasting[ended], axis=1)
         there = place[ended, step]
         u, v = column + self._columns[ended, step], row + self._rows[ended, step]
-        # the change says which way the boundary runs: across the picture if the normal turns up or down
+        # the change shows which way the boundary runs: across the picture if the normal turns up or down
         level = np.abs(n.y.ravel().take(there) - b) > np.abs(n.x.ravel().take(there) - a)
         cos, sin = self._cos[ended], self._sin[ended]
         return (
@@ -149,7 +149,7 @@ class BoxSearch:
         return np.floor((np.fmin(across, down) - 1.0) / self._step)
 
     def _side(self, places: np.ndarray, border: int) -> float:
-        """Where most rays of a side saw the boundary, or the picture's border if too few agree."""
+        """Where most rays of a side met the boundary, or the picture's border if too few agree."""
         if len(places) < _VOTES:
             return float(border)
         middle = float(np.median(places))

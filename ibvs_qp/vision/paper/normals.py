@@ -31,7 +31,7 @@ class NormalImage:
         stride: Depth readings per normal along rows and columns.
         shape: (rows, columns) of the normal image.
         x: Components of the normals in C, float32 (rows, columns); likewise y and z.
-        depth: Filtered depth [m], float32 (rows, columns); 0 where there is none.
+        depth: Filtered depth [m], float32 (rows, columns); 0 without a reading.
     """
 
     def __init__(self, shape: tuple[int, int], intrinsics: Intrinsics, config: PaperConfig) -> None:

@@ -1,4 +1,4 @@
-"""The paper's pipeline behind the interface of the own perception, so that the same pilot flies it."""
+"""The paper's pipeline behind the interface of the own perception, so that the same pilot can use it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ibvs_qp.vision.perception_result import PerceptionResult, make_result
 from ibvs_qp.vision.surface.layout import PictureLayout
 from ibvs_qp.vision.surface.seeds import UP_LEFT, facing
 
-#: Identities of the two lines: the paper knows no others, whichever edge is topmost or first at the moment.
+#: Identities of the two lines: the paper has no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2
 
 
@@ -29,9 +29,9 @@ class PaperPerception:
     """Topmost level line, first upright line, surface and flow velocity of every picture.
 
     No line is followed from picture to picture and none is expected: hints have no effect, and the two identities
-    belong to whatever is topmost or first. The search for the surface begins at the middle of the last box (the paper),
+    belong to the topmost or first edge. The search for the surface begins at the middle of the last box (the paper),
     or beside the brush where that place is hidden or nothing was found. Velocity is that of the own sparse flow, since
-    the paper only says that it takes one.
+    the paper only states that it uses one.
 
     Args:
         config: Settings of the pipeline.
@@ -49,7 +49,7 @@ class PaperPerception:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything seen."""
+        """Clear the memory."""
         self._gate.reset()
         self._flow.reset()
         self._center: tuple[float, float] | None = None

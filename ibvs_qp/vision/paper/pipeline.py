@@ -1,6 +1,6 @@
 """The paper's vision, one picture at a time: normal image, bounding box, Canny and Hough, slope threshold, choice.
 
-The named baseline beside the own perception: the paper's logic kept to the letter, its arithmetic vectorised and its
+The named baseline of the own perception: the paper's logic without changes, its arithmetic vectorised and its
 buffers allocated once per picture size.
 """
 
@@ -28,7 +28,7 @@ class PaperPipeline:
     Args:
         config: Settings; the default is the paper's.
         mask: The vehicle's own parts, uint8 (H, W), non-zero where it hides the view, or None for a bare camera.
-            The paper says nothing of them; without it the arm's outline is a line like any other.
+            The paper does not mention them; without the mask the arm's outline is a line like any other.
     """
 
     def __init__(self, config: PaperConfig | None = None, mask: np.ndarray | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What the paper's pipeline found in one picture, in the types of the own detection."""
+"""Result of the paper's pipeline for one picture, in the types of the own detection."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: The published pipeline rates no line: every line has this confidence [-].
 CONFIDENCE = 0.5
-#: Length that earns the full score, share of the picture's width; as in the own detection.
+#: Length that earns the full score, fraction of the picture's width; as in the own detection.
 _FULL_LENGTH = 0.4
 _NO_SIDES, _NO_PIXELS, _NO_STEP = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2)), np.zeros(3)
 
@@ -28,7 +28,7 @@ class PaperDetection:
 
     Attributes:
         plane: The surface, or None.
-        refused: Why there is none, or None.
+        refused: Why the surface is missing, or None.
         candidates: Every level and upright segment, longest first.
         horizontal: The topmost level one, or None.
         vertical: The first upright one, or None.
@@ -69,7 +69,7 @@ def candidate(
     Args:
         ends: (2, 2) [px].
         upright: Whether it is an upright one.
-        box: Tells on which side the surface lies.
+        box: Shows on which side the surface lies.
         intrinsics: (fx, fy, cx, cy) [px].
         width: Of the picture [px].
         sigma_px: Error of an end [px].

@@ -42,7 +42,7 @@ class SegmentFinder:
         self._grey, self._small, self._edges = (np.zeros(size, np.uint8) for size in (shape, half, half))
         self._hidden = None
         if hidden is not None and hidden.any():
-            # the vehicle's outline is an edge too: two pixels more than what it hides
+            # the vehicle's outline is an edge too: two pixels more than the hidden part
             size = (half[1], half[0])
             small = cv2.resize(hidden, size, interpolation=cv2.INTER_AREA)
             self._hidden = cv2.dilate(np.where(small > 0, np.uint8(255), np.uint8(0)), np.ones((5, 5), np.uint8))

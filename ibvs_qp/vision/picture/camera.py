@@ -49,7 +49,7 @@ class RgbdCamera:
             tiny.depth(np.ones((1, 1), np.float32))
 
     def picture(self, raw: RgbdFrame) -> RgbdFrame:
-        """The picture for perception; of one that it refuses, what can be read.
+        """The picture for perception; of a refused one, the readable part.
 
         Args:
             raw: Colour or mono, uint8 or uint16, (H, W) or (H, W, 3); depth in the stated unit, (h, w), of the same

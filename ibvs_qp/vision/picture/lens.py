@@ -11,7 +11,7 @@ import numpy as np
 _STEPS, _ACCURACY = 20, 1e-6
 #: Larger errors are of pixels outside the range of a lens model, which has no ray for them [-].
 _NO_RAY = 1e-3
-#: Least depth of a ray of the real camera per depth in C [-]: the others come from beside or behind it.
+#: Least depth of a ray of the real camera per depth in C [-]: the others come from the side or from behind.
 _LEAST_DEPTH = 0.1
 
 
@@ -22,7 +22,7 @@ def camera_matrix(intrinsics: Sequence[float]) -> np.ndarray:
 
 
 class Lens:
-    """A lens and its mount: a real camera sees along R' r what the ideal one sees along r.
+    """A lens and its mount: the view of a real camera along R' r is that of the ideal one along r.
 
     Args:
         distortion: Coefficients in OpenCV's order; none for an ideal lens.
@@ -83,8 +83,8 @@ def _bent(rays: np.ndarray, matrix: np.ndarray, distortion: np.ndarray) -> np.nd
 class Rectification:
     r"""Tables of one camera: the ray of every ideal pixel is looked up in the real picture.
 
-    The pixel of the ray :math:`r` in C shows what the real camera sees along :math:`R^T r`, bent by its lens; a depth z
-    of the real picture is :math:`z / (R^T r)_z` in C, with r scaled to a depth of 1. Beyond the border of the real
+    The pixel of the ray :math:`r` in C shows the view of the real camera along :math:`R^T r`, bent by its lens; a depth
+    z of the real picture is :math:`z / (R^T r)_z` in C, with r scaled to a depth of 1. Beyond the border of the real
     picture the colour of the border goes on, so that no edge is added, and the depth is invalid.
 
     Args:

@@ -1,4 +1,4 @@
-"""Depth of a camera beside the colour camera, as the ideal colour camera would measure it.
+"""Depth of a camera next to the colour camera, as the ideal colour camera would measure it.
 
 Forward projection with a z-buffer, and cracks of one pixel closed.
 """
@@ -53,7 +53,7 @@ class Registration:
         self._nearest = np.empty(self._shape, np.float32)
 
     def depth(self, depth: np.ndarray) -> np.ndarray:
-        """Depth in C [m], float32 (H, W), 0 where the depth camera sees nothing or something else."""
+        """Depth in C [m], float32 (H, W), 0 where the depth camera has no reading or another object."""
         self._nearest.fill(0.0)
         readings = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
         _project_depth(readings, self._rays, self._shift, self._half, self._nearest)
@@ -105,8 +105,8 @@ def _project_depth(
 def _cover(depth, rays, shift, half, shape, ahead, covered):
     """Depth in the target of a row of readings, (w,), and the rows and columns that they cover, (4, w).
 
-    Rows are from ``covered[0]`` to before ``covered[1]``, columns from ``covered[2]`` to before ``covered[3]``; none
-    for what is out of view. One loop without jumps: the processor takes several readings at once.
+    Rows are from ``covered[0]`` to before ``covered[1]``, columns from ``covered[2]`` to before ``covered[3]``; an
+    empty range if out of view. One loop without jumps: the processor takes several readings at once.
     """
     rows, columns = np.float32(shape[0]), np.float32(shape[1])
     (wide, high), (a, b, c) = (half[0], half[1]), (shift[0], shift[1], shift[2])

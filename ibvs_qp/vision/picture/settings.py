@@ -64,7 +64,7 @@ class RgbdCameraSettings:
             allowed = f"focal lengths must be above {_SHORTEST_PX:g} px"
             raise out_of_range("depth_intrinsics", self.depth_intrinsics, "px", allowed)
         if not self.registered and not self.depth_translation_m:
-            raise ConfigError("depth_translation_m is missing: depth_intrinsics are of a depth camera beside")
+            raise ConfigError("depth_translation_m is missing: depth_intrinsics are of a separate depth camera")
         for name in ("depth_distortion", "depth_rotation", "depth_translation_m"):
             if self.registered and getattr(self, name):
                 raise ConfigError(f"depth_intrinsics are missing: {name} is for depth that is not registered to colour")
@@ -84,8 +84,8 @@ class RgbdCameraSettings:
             return np.array(self.depth_rotation).reshape(3, 3)
         return rotation_from_vector(self.depth_rotation or (0.0, 0.0, 0.0))
 
-    def _require_count(self, name: str, counts: tuple[int, ...], what: str) -> None:
-        value, allowed = getattr(self, name), f"{what}: {', '.join(map(str, counts))}"
+    def _require_count(self, name: str, counts: tuple[int, ...], content: str) -> None:
+        value, allowed = getattr(self, name), f"{content}: {', '.join(map(str, counts))}"
         if len(value) not in counts:
             raise out_of_range(name, value, "px" if name == "depth_intrinsics" else "", allowed)
 

@@ -38,7 +38,7 @@ class SurfaceFinder:
     def find(
         self, frame: RgbdFrame, grid: CoarseGrid, seeds: list[tuple[int, int]], down: np.ndarray | None, bare: bool
     ) -> SurfaceRegion | str:
-        """Fit the surface through one of the seeds, or say why there is none.
+        """Fit the surface through one of the seeds, or return why it is missing.
 
         Args:
             frame: Colour and depth.
@@ -82,7 +82,7 @@ class SurfaceFinder:
     def _labels(self, samples: Samples, seed: tuple[int, int], bare: bool) -> np.ndarray:
         """Labels of the samples: by the board's colour, before it is known by that of the seed.
 
-        A seed may lie on something printed: then what is apart from it is something else.
+        A seed may lie on something printed: then parts apart from it are other objects.
         """
         labels = self.labels(samples)
         if labels is not None:
@@ -115,7 +115,7 @@ class SurfaceFinder:
         cells = samples_on(samples, plane, seed)
         color = ground_color(samples, cells, seed) if colors.board is None else colors.board
         alike = alike_colors(samples.colors, color)
-        # where depth does not tell the surface from a wall close behind it, its light has to
+        # where depth does not separate the surface from a wall close behind it, its light must
         even = evenly_lit(samples, cells & alike, seed) if _flush(cells, inverse) else None
         # in some light a wall may have the surface's colour: the plane is that of the colour itself
         prefer = (
@@ -130,7 +130,7 @@ class SurfaceFinder:
         flush = even is not None or _flush(cells, inverse)
         if even is None and flush:  # noise may hide the wall until the plane is exact
             even = evenly_lit(samples, cells & alike, seed)
-        if even is not None:  # what else has its depth is the wall
+        if even is not None:  # other samples of its depth are the wall
             cells, alike = cells & even, alike | even
         elif flush:
             alike = prefer == BOARD
@@ -148,8 +148,8 @@ class SurfaceFinder:
     ) -> SurfaceRegion:
         """The samples on a plane; where a wall may be among them, those that the colours of board and paint enclose.
 
-        A wall may have the board's colour in another light than its own: then only its very colour counts. Without the
-        paint's colour nothing is left out, for what is painted may part the board; unless colour told it before.
+        A wall may have the board's colour in different light: then only its exact colour counts. If the colour of the
+        paint is unknown, nothing is left out, because paint may divide the board; a colour search needs no such care.
         """
         colors, grid, flush = self._colors, samples.grid, _flush(cells, samples.inverse)
         alike = labels == BOARD if flush or colors.light is not None else alike_colors(samples.colors, color)
@@ -160,7 +160,7 @@ class SurfaceFinder:
 
 
 def _without_wall(cells: np.ndarray, alike: np.ndarray, grid: CoarseGrid) -> np.ndarray:
-    """Samples that depth cannot tell from a wall, without what the surface's colour does not enclose."""
+    """Samples that depth cannot separate from a wall, within the contour of the surface's colour."""
     own = cells & alike
     return cells & (filled(connected(own, grid, middle_cell(own))) > 0) if own.any() else cells
 

@@ -18,23 +18,24 @@ _PIECE = 150
 
 #: Largest change from one sample to the next within an evenly lit surface, per channel [grey levels].
 _STEP = 9
-#: A part smaller than this many samples, or than this fraction of what has the surface's colour, does not count.
+#: A part smaller than this many samples, or than this fraction of the samples with the surface's colour, does not
+#: count.
 _PART, _PART_SHARE = 150, 0.10
 #: Nor does one that is nearly all of it.
 _ALL = 0.985
 #: Fraction of the samples just beyond the part that must have the surface's colour in some light: beyond prints they do
 #: not, beyond an edge towards a wall of nearly the same colour they do.
 _ALIKE_BEYOND = 0.4
-#: A part that fills this fraction of its convex hull, and this fraction of what has the colour, is a surface of its
-#: own: joints of a wall and the like have its colour, but are thin.
+#: A part that fills this fraction of its convex hull, and this fraction of the samples with the colour, is a surface of
+#: its own: joints of a wall and the like have its colour, but are thin.
 _SOLID, _SOLID_SHARE = 0.85, 0.3
 
 
 def ground_color(samples: Samples, cells: np.ndarray, seed: tuple[int, int]) -> np.ndarray:
     """Colour of the bare surface, RGB (3,): that around the seed where it covers much, else the most common near by.
 
-    A seed may lie on something printed or painted, and a wall close behind the surface may outnumber it. What is
-    painted lies on a ground that is a larger even piece than itself; a small board before a wall of bricks does not.
+    A seed may lie on something printed or painted, and a wall close behind the surface may outnumber it. Paint
+    lies on a ground that is a larger even piece than itself; a small board before a wall of bricks does not.
     The surface's samples by depth are bool (rows, columns).
     """
     grid, coarse = samples.grid, samples.colors
@@ -64,7 +65,7 @@ def _largest(region: np.ndarray) -> int:
 
 
 def evenly_lit(samples: Samples, own: np.ndarray, seed: tuple[int, int]) -> np.ndarray | None:
-    """The part of what seems to be the surface that its light joins to the seed, where that ends at a real edge.
+    """The part of the apparent surface that its light joins to the seed, where that ends at a real edge.
 
     Given and returned are samples, bool (rows, columns): those with the depth and, in some light, the colour of the
     surface, and the part; None where all of them are joined, or nothing is certain.

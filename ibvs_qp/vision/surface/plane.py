@@ -17,10 +17,10 @@ from ibvs_qp.vision.picture.grid import CoarseGrid
 #: Samples per row of a search against those of the sparser grid on which a surface is followed: the noise is correlated
 #: over 20 px of 640, so that the mean of four neighbours every 16 px is as good as one reading every 8 px.
 SPARSER = 2
-#: Gate of what looks like paint in either round, fraction of the board's: a wall that looks like paint must not get in,
-#: so what looks like it counts in the last round of a search only, and has to fit twice as well. For a followed surface
-#: half of the first gate (1.25 % of depth), and more than two sigmas of the last one, lie well within 4 %, a gap of
-#: 0.02 m at 0.5 m.
+#: Gate of samples that look like paint in either round, fraction of the board's: a wall that looks like paint must not
+#: get in, so such samples count in the last round of a search only, and have to fit twice as well. For a followed
+#: surface half of the first gate (1.25 % of depth), and more than two sigmas of the last one, lie well within 4 %, a
+#: gap of 0.02 m at 0.5 m.
 _PAINT_SEARCHED, _PAINT_FOLLOWED = (0.0, 0.5), (0.5, 0.75)
 #: Side of the blocks over which residuals are averaged to measure their correlation [samples of a search].
 _BLOCK = 8
@@ -87,7 +87,7 @@ def refit_plane(
         seed: The surface is the part around this sample; None takes the largest.
 
     Returns:
-        The surface, or the reason why there is none.
+        The surface, or the reason why it is missing.
     """
     searched = sigma is None
     design, block, paint_gates = grid.design, _BLOCK, _PAINT_SEARCHED
@@ -122,8 +122,8 @@ def refit_plane(
         if searched:
             some = relative[component.reshape(-1)][:: max(1, count // _SPREAD)]
             spread = MAD_TO_SIGMA * median(np.abs(some - median(some)))
-        wanted = config.fine_gate_sigmas * (spread if sigma is None else sigma)
-        gate = min(max(wanted, config.fine_gate_low), config.fine_gate_high)
+        gate = config.fine_gate_sigmas * (spread if sigma is None else sigma)
+        gate = min(max(gate, config.fine_gate_low), config.fine_gate_high)
     length = math.hypot(*plane.tolist())
     upright = float(plane[2]) > math.cos(math.radians(config.max_oblique_deg)) * length
     if down is not None:
@@ -192,8 +192,8 @@ def choose_samples(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Usable samples (n,) within a gate of a plane, those of the surface's colours alone where at least so many are.
 
-    What looks like paint counts within a fraction of the gate. Distances are fractions of the samples' own depth or the
-    plane's, undefined where not usable; returned with the chosen samples, (n,) each.
+    Samples that look like paint count within a fraction of the gate. Distances are fractions of the samples' own depth
+    or the plane's, undefined where not usable; returned with the chosen samples, (n,) each.
     """
     relative = np.empty(len(inverse))
     near = np.zeros(len(inverse), np.bool_)

@@ -1,4 +1,4 @@
-"""The surface through a seed without a prediction: random planes, scored by what agrees with each, then refitted."""
+"""The surface through a seed without a prediction: random planes, scored by the agreeing samples, then refitted."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ibvs_qp.vision.surface.plane import PlaneEstimate, refit_plane
 from ibvs_qp.vision.surface.seeds import seed_values
 
 #: Samples by which planes are scored; more cost time and change nothing.
-_JUDGES = 400
+_VOTERS = 400
 #: Radius that counts around the seed when planes are scored, normalised.
 _NEAR = 0.25
 #: Fraction of the coarse gate within which a sample votes for a plane.
 _VOTE = 0.6
 #: Smallest area that two arms of a plane span, normalised.
 _SPAN = 1e-4
-#: Distances from the seed up to which samples count while a plane grows, one after the other, normalised.
+#: Distances from the seed up to which samples count while a plane grows, in sequence, normalised.
 _RADII = (0.10, 0.14, 0.20, 0.28, 0.40, 0.60)
 #: Fewer samples near the seed give no plane to grow.
 _LEAST = 40
@@ -57,22 +57,22 @@ class PlaneSearch:
             grid: Where the samples lie.
             inverse: 1/Z of the samples [1/m], 0 where absent, (rows, columns).
             seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first. At the
-                same depth the first one counts: a row begins at its right end, so its left is surely on the surface.
+                same depth the first one counts: a row begins at its right end, so its left is on the surface.
             down: Gravity's direction in C, unit, (3,), or None if unknown.
             prefer: Colour labels of the samples for each seed, or None.
 
         Returns:
-            The surface, or the reason why there is none.
+            The surface, or the reason why it is missing.
         """
         values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
         reason = "no valid depth around the seed"
-        for index, wanted in self._attempts(order, values, seeds, prefer):
-            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, wanted)
+        for index, labels in self._attempts(order, values, seeds, prefer):
+            start = self._hypothesis(grid, inverse, seeds[index], values[index], down, labels)
             if start is None:
                 reason = "no plane through the seed stands upright and faces the camera"
                 continue
-            result = refit_plane(grid, inverse, wanted, start, down, self._config, seed=seeds[index])
+            result = refit_plane(grid, inverse, labels, start, down, self._config, seed=seeds[index])
             if isinstance(result, PlaneEstimate):
                 return result
             reason = result
@@ -109,7 +109,7 @@ class PlaneSearch:
     ) -> list[int]:
         """The order of seeds, with the first listed one in front where the nearest one differs from it by colour only.
 
-        A board that is flush with its wall cannot be told from it by depth.
+        Depth cannot separate a board from a wall that is flush with it.
         """
         first = min(flush)
         if first == order[0]:
@@ -141,9 +141,9 @@ class PlaneSearch:
         if len(near) < config.min_samples:
             return None
         pairs = self._random.choice(near, (2, config.hypotheses))
-        judges = np.ascontiguousarray(near[:: max(1, len(near) // _JUDGES)])
+        voters = np.ascontiguousarray(near[:: max(1, len(near) // _VOTERS)])
         planes, score = score_planes(
-            design, flat, place, value, pairs, judges, _VOTE * config.coarse_gate, _NEAR, _SPAN
+            design, flat, place, value, pairs, voters, _VOTE * config.coarse_gate, _NEAR, _SPAN
         )
         length = np.linalg.norm(planes, axis=1)
         upright = planes[:, 2] > math.cos(math.radians(config.max_oblique_deg)) * length
@@ -161,14 +161,14 @@ def score_planes(
     seed: int,
     value: float,
     pairs: np.ndarray,
-    judges: np.ndarray,
+    voters: np.ndarray,
     gate: float,
     width: float,
     span: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Planes through a seed of some value and pairs of samples, and the weight of the judges that agree with each.
+    """Planes through a seed of some value and pairs of samples, and the weight of the voters that agree with each.
 
-    A judge counts less the farther from the seed, by 1/e at a width. Planes whose arms span less area are level.
+    A voter counts less the farther it is from the seed, by 1/e at a width. Planes whose arms span less area are level.
 
     Returns:
         (a, b, c) of the planes, (planes, 3), and the weights, (planes,).
@@ -183,7 +183,7 @@ def score_planes(
         safe = cross if abs(cross) > span else np.inf
         a[k], b[k] = (rise1 * y2 - rise2 * y1) / safe, (rise2 * x1 - rise1 * x2) / safe
         c[k] = value - a[k] * x0 - b[k] * y0
-    for place in judges:
+    for place in voters:
         u, v, d = design[place, 0], design[place, 1], inverse[place]
         x, y, near = u - x0, v - y0, gate * d
         weight = math.exp(-(x * x + y * y) / (width * width))

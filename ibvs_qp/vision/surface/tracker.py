@@ -53,7 +53,7 @@ class SurfaceTracker:
         down: np.ndarray | None,
         seed_pixel: tuple[float, float] | None,
     ) -> str | None:
-        """Follow the surface or search it; returns the reason when there is none.
+        """Follow the surface or search it; returns the reason when it is missing.
 
         Args:
             frame: Colour and depth.

@@ -42,7 +42,7 @@ class Device:
 
     @property
     def settings(self) -> RgbdCameraSettings:
-        """What the reader of its pictures has to know."""
+        """Data for the reader of its pictures."""
         return RgbdCameraSettings(
             distortion=self.distortion,
             depth_units_per_metre=1.0 / self.depth_step_m,

@@ -43,7 +43,7 @@ class TruthFrame:
     seed: tuple[float, float]  # (u, v) of a point on the board [px]
     mask: np.ndarray  # pixels that the vehicle covers, bool (H, W)
     raw: RgbdFrame | None = (
-        None  # what the device delivers: distorted, depth in its own picture; None for an ideal camera
+        None  # raw frame of the device: distorted, depth in its own picture; None for an ideal camera
     )
 
 

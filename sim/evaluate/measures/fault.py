@@ -1,4 +1,4 @@
-"""Figures of a flight with a fault: what the vehicle and its commands did, and when the supervisor acted."""
+"""Figures of a flight with a fault: motion and commands of the vehicle, and times of the supervisor."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STATES = tuple(SafetyState)
 #: A rotor differs from its command beyond this [N]: the least thrust that the monitor of rotors may miss
 #: (`safety.missing_thrust_n`); wrong gains of sound rotors make up 1 N.
 DEVIATION_N = 2.5
-#: The attitude is judged from this time on [s]: the vehicle is released at hover.
+#: The attitude is scored from this time on [s]: the vehicle is released at hover.
 SETTLED_S = 1.0
 
 

@@ -63,7 +63,7 @@ def push_reach(
 
 
 def push_figures(trace: Trace, push: np.ndarray, commanded: float, sliding_friction: float = 0.0) -> dict[str, float]:
-    """Delivered push beside the commanded one, the job's, and the reach of the true limits at the end of the flight.
+    """Delivered push with the commanded one, the job's, and the reach of the true limits at the end of the flight.
 
     Args:
         trace: The flight.

@@ -18,7 +18,7 @@ _PALER = 0.6
 
 
 def draw_bars(spec: FigureSpec, results: Results) -> Drawn:
-    """Bars per value of the parameter: one per law, and per variant of the figure that the law flew."""
+    """Bars per value of the parameter: one per law, and per variant of the figure with flights of the law."""
     table = select(results.table, spec.where)
     if not table.height:
         return {}

@@ -20,7 +20,7 @@ from sim.flight.trace import Trace
 from sim.sweep.statistics import select
 from sim.world.board import BoardGeometry
 
-#: Colours of quantities beside the law's own: true values under estimates, and the second and third axis.
+#: Colours of quantities other than the law's own: true values under estimates, and the second and third axis.
 TRUE, SECOND, THIRD = "#f0a94b", "#333333", "#9a4f8f"
 #: The attitude is shown at least to this angle [deg]; greater ones widen the axis.
 LEAST_ANGLE_DEG = 1.0
@@ -93,7 +93,7 @@ def _board(axes: Axes, trace: Trace) -> None:
 
 
 def _trajectory(axes: Axes, trace: Trace) -> None:
-    """Oblique view: the wall lies in the page, what is off the wall goes down to the right."""
+    """Oblique view: the wall lies in the page, points off the wall go down to the right."""
     along, up = BoardGeometry(trace.scene).board_coordinates(trace.tip[:, 1:]).T
     off = np.maximum(-trace.tip[:, 0], 0.0)
     width = trace.scene.board.width_m

@@ -20,7 +20,7 @@ from sim.sweep.statistics import select
 
 #: One dot in so many ticks.
 EVERY = 12
-#: Lightest colour used, as a share of the map's.
+#: Lightest colour used, as a fraction of the map's.
 LIGHTEST = 0.9
 _WORDS = {
     "standard": "with the reach check",

@@ -1,4 +1,4 @@
-"""``python -m sim.experiments.law_goals --jobs 2``: fly what is missing, print every goal with figure and n.
+"""``python -m sim.experiments.law_goals --jobs 2``: fly the missing flights, print every goal with figure and n.
 
 ``before.csv`` holds the figures of the QP of revision 1262c78, whose rows lack the rotors, same scenes, same seeds.
 Exits 1 when a goal is missed. ``--part 0`` only prints.
@@ -31,8 +31,8 @@ def main() -> int:
     add_part_options(parser, "runs/law_goals")
     given = parse_part(parser)
     runs = design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric", compiled=True))
-    wanted = [run for run in runs if not given.kinds or run.params["kind"] in given.kinds]
-    table, interrupted = fly_part(runs, wanted, given, "goals of the law")
+    chosen = [run for run in runs if not given.kinds or run.params["kind"] in given.kinds]
+    table, interrupted = fly_part(runs, chosen, given, "goals of the law")
     before = pl.read_csv(HERE / "before.csv")
     goals = load_toml(Goals, HERE / "goals.toml").goals
     planned = Counter((run.params["kind"], run.params["world"]) for run in runs)

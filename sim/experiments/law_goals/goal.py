@@ -50,12 +50,12 @@ class Goals:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What the flights say of a goal, in SI, NaN without data; the ratio with its exact interval.
+    """Result of the flights for a goal, in SI, NaN without data; the ratio with its exact interval.
 
     Attributes:
         goal: The goal.
         before: Median of before.
-        now: Median of the flights that completed, or what the goal says.
+        now: Median of the flights that completed, or the figure of the goal.
         ratio: Median ratio of pairs with the same seed.
         interval: Of that median.
         n: Flights with the figure, pairs for a ratio.

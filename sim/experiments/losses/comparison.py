@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def outcome(self) -> Outcome:
-        """Whether the whole exact interval is worse, or better, than what matters."""
+        """Whether the whole exact interval is worse, or better, than the threshold that matters."""
         if self.pairs < needed():
             return Outcome.FEW
         low, high = self.interval
@@ -60,7 +60,7 @@ class Comparison:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Experiment, cell, opponent, figure, how much worse with its interval, what matters, pairs."""
+        """Experiment, cell, opponent, figure, how much worse with its interval, threshold that matters, pairs."""
         cell = ", ".join(f"{name} {value}" for name, value in self.params.items())
         low, high = self.interval
         worse = f"{self.worse:.3g} ({low:.3g} to {high:.3g})"

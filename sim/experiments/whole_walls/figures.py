@@ -9,20 +9,20 @@ from pathlib import Path
 
 import polars as pl
 
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.experiments.whole_walls.flights import EARLY_STROKE
 from sim.flight.trace_log import load_trace
 from sim.sweep.design import Run
 from sim.sweep.parts import PARAM
 from sim.world.worlds import HARSH
 
-#: Least share of complete flights by set; the sets with faults have no such goal.
+#: Least fraction of complete flights by set; the sets with faults have no such goal.
 COMPLETE_GOAL = {"datasheet": 1.0, HARSH: 0.9, "rendered": 1.0}
 #: Least coverage of a flight, and largest place error of the last strokes as a multiple of that of an early one [-].
 COVERAGE_GOAL, PLACE_GOAL = 0.98, 2.0
 #: Sets with these two goals.
 _COVERED = ("datasheet", "rendered")
-#: Most false claims, and least share of the complete flights that are claimed.
+#: Most false claims, and least fraction of the complete flights that are claimed.
 FALSE_GOAL, CLAIMED_GOAL = 0, 0.98
 
 
@@ -110,7 +110,7 @@ def _of_set(name: str, law: str, rows: pl.DataFrame, planned: Sequence[Run]) -> 
 
 
 def failures(table: pl.DataFrame, folder: Path) -> Iterator[str]:
-    """Every flight that is not complete and claimed, in one line each: where, what the pilot says, what is true."""
+    """Every flight that is not complete and claimed, in one line each: place, claim of the pilot, truth."""
     for row, done in zip(table.iter_rows(named=True), _done(table), strict=True):
         covered = row.get("coverage") or 0.0
         gaps = done and row["experiment"] in _COVERED and covered < COVERAGE_GOAL
@@ -120,7 +120,7 @@ def failures(table: pl.DataFrame, folder: Path) -> Iterator[str]:
         found = f"{row['experiment']}, {row['variant']}, {row['law']}, seed {row['seed']} ({job}): {row['reason']}"
         found += f"; covers {100.0 * covered:.1f} %" if gaps else ""
         if not row["claimed"] and not done and row["trace"]:
-            found += f"; by the truth: {Judgement(load_trace(folder / row['trace'])).shortfall}"
+            found += f"; by the truth: {Assessment(load_trace(folder / row['trace'])).shortfall}"
         yield found
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from sim.evaluate.measures import paint_figures
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.experiments.whole_walls.scenes import walls
 from sim.experiments.whole_walls.vision_faults import faulty_jobs
 from sim.faults.fault import Fault
@@ -99,14 +99,14 @@ def paint_run(
 
 def wall_figures(trace: Trace) -> dict[str, float]:
     """Figures of a paint job; whether the truth completes it; place errors of stroke 5 and of the last one [m]."""
-    judgement = Judgement(trace)
+    assessment = Assessment(trace)
 
     def place(number: int) -> float:
-        stroke = judgement.strokes.get(number)
+        stroke = assessment.strokes.get(number)
         return math.nan if stroke is None else stroke.place_error_m
 
     return paint_figures(trace) | {
-        "done": float(judgement.completed),
+        "done": float(assessment.completed),
         "place_early_m": place(EARLY_STROKE),
         "place_last_m": place(BoardGeometry(trace.scene).strokes),
     }

@@ -102,7 +102,7 @@ def vehicle_mask(scene: Scene, vehicle: VehicleParams, intrinsics: tuple[float, 
 
 
 def shade_propellers(picture: np.ndarray, propellers: np.ndarray) -> None:
-    """Darken a picture, uint8 (H, W, C), in place under the propeller mask, as blades too fast to see do."""
+    """Darken a picture, uint8 (H, W, C), in place under the propeller mask, as fast blades do."""
     dimmed = cv2.convertScaleAbs(picture, alpha=1.0 - _PROPELLER_SHADE, beta=12.0)
     cv2.copyTo(dimmed, propellers, picture)
 

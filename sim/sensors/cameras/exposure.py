@@ -35,7 +35,7 @@ def line_kernel(u_px: float, v_px: float) -> np.ndarray:
 def vibration_sigma_px(focal_px: float, rate_rad_s: float, exposure_s: float) -> float:
     """Blur by vibration, standard deviation per axis [px].
 
-    A short exposure sees a constant rate; a long one sees at most the whole stroke of the vibration.
+    The rate is constant in a short exposure; a long one contains at most the whole stroke of the vibration.
 
     Args:
         focal_px: Focal length.

@@ -1,7 +1,7 @@
 """A headless OpenGL context: EGL if there is one, else OSMesa; libraries are loaded on first use.
 
 MuJoCo picks its own context by the environment variable MUJOCO_GL when it is imported, and fails at import where the
-library is missing. So the variable is never set here: the context is made beside MuJoCo's choice.
+library is missing. So the variable is never set here: the context is independent of MuJoCo's choice.
 """
 
 # MuJoCo's bindings carry no types.

@@ -13,7 +13,7 @@ from sim.sensors.cameras.timing import DeliveryErrors
 from sim.world.scene import CameraScene
 
 NS_PER_S = 1_000_000_000
-#: What a sensor delivers.
+#: Output of a sensor.
 Item = TypeVar("Item")
 
 
@@ -44,7 +44,7 @@ class Camera(Protocol):
         Args:
             position_ned: World position of the body frame's origin [m], (3,).
             quaternion_b_in_i: Attitude (w, x, y, z), (4,).
-            stamp_ns: Time of capture; of the middle row where the rows are exposed one after the other.
+            stamp_ns: Time of capture; of the middle row if the rows are exposed in sequence.
             twist: Velocity of the body's origin [m/s] and angular velocity [rad/s] in B, (6,); None at rest.
         """
         ...

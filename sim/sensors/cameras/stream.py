@@ -13,7 +13,7 @@ from sim.sensors.cameras.timing import DeliveryErrors
 
 
 class CameraStream:
-    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture, but for their errors.
+    """Pictures at a fixed rate with a fixed latency; stamps give the time of capture, except for their errors.
 
     Args:
         camera: The back end; it draws at the time of capture.

@@ -1,4 +1,4 @@
-"""Geometry of a real picture: lens distortion, and rows that are exposed one after the other."""
+"""Geometry of a real picture: lens distortion, and rows that are exposed in sequence."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class PictureWarp:
             self._lens = cv2.convertMaps(self._dense(self._ideal, np.zeros(2)), _ONE_PART, cv2.CV_16SC2)
 
     def picture(self, picture: np.ndarray, plane: np.ndarray, twist: np.ndarray | None) -> np.ndarray:
-        """The picture, uint8 (H, W, 3), as lens and shutter show it; itself where they do nothing.
+        """The picture, uint8 (H, W, 3), as lens and shutter show it; unchanged without both.
 
         A warped picture holds until the next call.
 

@@ -109,7 +109,7 @@ def test_a_push_below_the_least_is_named(law: type) -> None:
     weak = np.where(np.array(TAROT_T960.names) == "front_left", WEAK, full)
     said, margin, least = commanded(5.0, weak, law)
     assert least == pytest.approx(10.3, abs=0.05)
-    assert "reference.push_force: 5.0 N" in said and f"least {least:.1f} N" in said
+    assert "reference.push_force: 5.0 N" in said and f"least push of the rotors, {least:.1f} N" in said
     assert math.isfinite(margin)
     assert commanded(15.0, weak, law)[0] == "" and commanded(5.0, full, law)[0] == ""
 

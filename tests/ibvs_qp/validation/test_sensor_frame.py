@@ -166,7 +166,7 @@ def test_what_is_no_picture_is_named(name: str, wanted: str) -> None:
 def test_features_beside_a_picture_are_named() -> None:
     checked, rejected = gate().check(frame(10, image=replace(PICTURE, stamp_ns=9), features=replace(EMPTY, stamp_ns=8)))
     assert checked is not None and checked.features is None and checked.image is not None
-    assert rejected == ("sensor features: not used beside an image",)
+    assert rejected == ("sensor features: not used together with an image",)
 
 
 @pytest.mark.parametrize("thing", [None, 7, "frame", SensorFrame])

@@ -35,7 +35,7 @@ def test_a_painted_flight_replays_to_the_bit(tmp_path: Path, capsys: pytest.Capt
     ticks = len(load_run(flown)["qp"].t)
     assert said["same"] and said["first"] is None and said["ticks"] == ticks > 2000 and said["complete"]
     assert main(["replay", str(flown / "flight_qp.mcap")]) == 0
-    assert f"Same to the bit over {ticks} ticks." in capsys.readouterr().out
+    assert f"Bit-identical over {ticks} ticks." in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -84,8 +84,8 @@ def test_a_cut_log_is_repaired(tmp_path: Path, capsys: pytest.CaptureFixture[str
     file.write_bytes(file.read_bytes()[: 2 * file.stat().st_size // 3])
     assert main(["replay", str(file), "--repair", str(tmp_path / "b.mcap")]) == 0
     said = capsys.readouterr().out
-    assert "Same to the bit" in said and "The log has no end" in said and "Written:" in said
+    assert "Bit-identical" in said and "The log has no end" in said and "Written:" in said
     assert main(["replay", str(tmp_path / "b.mcap")]) == 0
-    assert "Same to the bit" in capsys.readouterr().out
+    assert "Bit-identical" in capsys.readouterr().out
     assert main(["replay", str(file), "--repair", str(tmp_path / "b.mcap")]) == 2
     assert "File exists" in capsys.readouterr().err

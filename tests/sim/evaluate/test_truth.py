@@ -13,7 +13,7 @@ from synthetic_trace import Errors, synthetic_trace
 from sim.evaluate.flight_table import false_claims
 from sim.evaluate.metrics import compute_metrics
 from sim.evaluate.strokes import painted_strokes
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.flight.trace import INTERRUPTED, KILLED, Event, Trace
 from sim.world.board import BoardGeometry
 from sim.world.scene import BoardScene, PaintScene, Scene, WindScene
@@ -25,7 +25,7 @@ PATTERNS = [(kind, f"{high}-{side}") for kind in ("rows", "columns") for high in
 
 
 def shortfall(trace: Trace) -> str | None:
-    return Judgement(trace).shortfall
+    return Assessment(trace).shortfall
 
 
 def three_rows(*offsets: float, **errors: float) -> Trace:
@@ -60,7 +60,7 @@ def test_legs_of_an_own_strategy_are_compared_with_the_way_of_the_tip():
     trace.legs = (*legs, (0.0, -0.2))
     assert shortfall(trace) == "leg 4: not painted"
     trace.legs = ((-0.6, 0.0), (0.6, 0.02), (-0.6, 0.0))
-    assert shortfall(trace) == "leg 2: it ends 20 mm beside its line"
+    assert shortfall(trace) == "leg 2: it ends 20 mm from its line"
     trace.legs = legs
     u = along(trace)
     middle = (trace.row == 2) & (np.abs(u - np.median(u[trace.row == 2])) < 0.05)

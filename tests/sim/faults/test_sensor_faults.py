@@ -13,7 +13,7 @@ from ibvs_qp.frames import roll_pitch
 from ibvs_qp.measurement import HORIZONTAL, FeatureFrame, LineFeature, RgbdFrame, SensorFrame
 from ibvs_qp.validation.fields import SENSOR_FRAME
 from sim.faults.camera import CameraFrozen, CameraJitter, CameraLatency, CameraLost, CameraReordered
-from sim.faults.clock import ClockLeap, LoopStall, SlowLoop, TicksSkipped
+from sim.faults.clock import ClockJump, LoopStall, SlowLoop, TicksSkipped
 from sim.faults.fault import ChannelFault
 from sim.faults.features import DepthFlipped, FeatureNan, LinesLost, PlaneLost, WrongLines
 from sim.faults.force_torque import ForceTorqueBias, ForceTorqueLost, ForceTorqueNan, ForceTorqueStuck, ForceTorqueZero
@@ -187,11 +187,11 @@ def test_biases_and_steps_of_the_inertial_unit():
 
 
 def test_a_clock_leap_moves_what_is_taken_after_it():
-    first, *_, last = through(ClockLeap(offset_s=-2.0))
+    first, *_, last = through(ClockJump(offset_s=-2.0))
     assert first[1].stamp_ns == first[0].stamp_ns - 2_000_000_000
     assert first[1].features.stamp_ns == first[0].features.stamp_ns  # captured before
     assert last[1].wrench_stamp_ns == last[0].wrench_stamp_ns - 2_000_000_000
-    late = [(f.features, g.features) for f, g in through(ClockLeap(offset_s=-2.0)) if f.features][-1]
+    late = [(f.features, g.features) for f, g in through(ClockJump(offset_s=-2.0)) if f.features][-1]
     assert late[1].stamp_ns == late[0].stamp_ns - 2_000_000_000 == late[1].lines[0].stamp_ns
 
 

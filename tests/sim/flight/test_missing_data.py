@@ -77,7 +77,7 @@ def test_a_contact_survives_a_hole_in_the_data(
     assert state.distance == pytest.approx(distance, abs=6e-3)
     assert pilot.status.safety in ("nominal", "degraded") and pilot.painter.phase == "paint"
     noted = [text for _, kind, text in pilot.painter.log if kind == "wall"]
-    assert len(noted) == wall_seen and all(" mm before the seen surface" in text for text in noted)
+    assert len(noted) == wall_seen and all(" mm before the observed surface" in text for text in noted)
 
 
 def test_a_board_before_the_seen_wall_is_pressed_softly() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim.evaluate.measures import paint_figures
-from sim.evaluate.truth import Judgement
+from sim.evaluate.truth import Assessment
 from sim.experiments.scenes import short_job
 from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
@@ -39,7 +39,7 @@ def test_corners_of_the_noise_sweep(vs: float, force: float, law: str) -> None:
     assert trace.phases[int(trace.phase[-1])] == "done"
     assert trace.claimed or vs > 0.1, trace.reason
     if vs < 0.1:
-        assert Judgement(trace).completed or not trace.claimed
+        assert Assessment(trace).completed or not trace.claimed
     figures = paint_figures(trace)
     assert figures["contact_share"] >= 0.995
     if law == "qp":

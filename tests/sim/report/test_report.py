@@ -15,7 +15,7 @@ from ibvs_qp.controller import default_limits, qp_problem
 from sim.evaluate.figures import FIGURES as FIGURES_OF_MERIT
 from sim.evaluate.metrics import compute_metrics
 from sim.figures import FIGURES, draw_all
-from sim.report import plain_words
+from sim.report import wording
 from sim.report.report import write_report
 from sim.report.rundir import RunFolder, summary
 from sim.world.scene import PaintScene, Scene
@@ -112,9 +112,9 @@ def test_a_false_claim_is_marked(page, traces, tmp_path):
 
 def test_every_row_of_the_report_has_a_meaning(page):
     assert all(figure.about for figure in FIGURES_OF_MERIT.values() if figure.of is not None)
-    assert set(plain_words.OUTCOMES) == set(Outcome)
+    assert set(wording.OUTCOMES) == set(Outcome)
     config = ControllerConfig()
     names = [row.name for limit in default_limits(config) for row in limit.rows(qp_problem(config).model)]
-    assert all(plain_words.limit_words(name) for name in names)
-    for words in (FIGURES_OF_MERIT["coverage"].about, plain_words.OUTCOMES["solved"]):
+    assert all(wording.limit_words(name) for name in names)
+    for words in (FIGURES_OF_MERIT["coverage"].about, wording.OUTCOMES["solved"]):
         assert words in page

@@ -1,4 +1,4 @@
-"""Drawn scenes cover every key over its range, and their flights are judged by the truth."""
+"""Drawn scenes cover every key over its range, and their flights are checked by the truth."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,9 +8,9 @@ import pytest
 from sim.flight.options import FlightOptions
 from sim.flight.preflight import job_problems
 from sim.scene_fuzz import __main__ as command
-from sim.scene_fuzz import judge as judging
+from sim.scene_fuzz import check
+from sim.scene_fuzz.check import BAD, check_draw, check_file
 from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
-from sim.scene_fuzz.judge import BAD, judge_draw, judge_file
 from sim.world.scene import Scene, load_scene
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)
@@ -39,7 +39,7 @@ def test_draws_that_take_too_long_are_drawn_again_and_strokes_fit_the_board():
         assert "wall.color" not in moved
         assert scene.paint.stroke_m / scene.paint.speed_m_s <= 60.0
         if "paint.stroke_m" not in moved and scene.paint.edge_margin_m <= 0.05:
-            pilot = judging.pilot_config(scene, OPTIONS)
+            pilot = check.pilot_config(scene, OPTIONS)
             assert not any("paint.stroke_m" in text for text in job_problems(scene, pilot, "geometric"))
 
 
@@ -54,28 +54,28 @@ def test_draws_that_take_too_long_are_drawn_again_and_strokes_fit_the_board():
     ],
 )
 def test_outcome_is_what_the_truth_makes_of_the_claim(monkeypatch, completed, claimed, reason, outcome):
-    monkeypatch.setattr(judging, "fly", lambda scene, options: SimpleNamespace(reason=reason))
+    monkeypatch.setattr(check, "fly", lambda scene, options: SimpleNamespace(reason=reason))
     figures = {"completed": completed, "claimed": claimed, "not_completed": None if completed else "row 1: short"}
     figures["push_peak_ratio"] = 3.0
-    monkeypatch.setattr(judging, "compute_metrics", lambda trace: figures)
-    judged = judge_draw(0, OPTIONS, "datasheet", 150.0)
-    assert judged.outcome == outcome and (outcome in BAD) == outcome.isupper()
-    assert reason in str(judged) and str(judged).endswith("(push 3.0 x)")
+    monkeypatch.setattr(check, "compute_metrics", lambda trace: figures)
+    checked = check_draw(0, OPTIONS, "datasheet", 150.0)
+    assert checked.outcome == outcome and (outcome in BAD) == outcome.isupper()
+    assert reason in str(checked) and str(checked).endswith("(push 3.0 x)")
 
 
 def test_refusals_and_internal_errors_are_told_apart(monkeypatch):
     def broken(scene, options):
         raise ZeroDivisionError("pitch")
 
-    monkeypatch.setattr(judging, "fly", broken)
-    outcomes = {judge_draw(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
+    monkeypatch.setattr(check, "fly", broken)
+    outcomes = {check_draw(seed, OPTIONS, "datasheet", 150.0).outcome for seed in range(40)}
     assert outcomes == {"refused before flight", "INTERNAL ERROR"}
 
 
 def test_a_scene_of_a_file_is_refused_by_name(tmp_path):
     (tmp_path / "thin.toml").write_text("[paint]\noverlap_m = 0.08\n")
-    judged = judge_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
-    assert judged.outcome == "refused before flight" and str(judged).startswith("thin 3: refused before flight: ")
+    checked = check_file(tmp_path / "thin.toml", OPTIONS, "datasheet", 3)
+    assert checked.outcome == "refused before flight" and str(checked).startswith("thin 3: refused before flight: ")
 
 
 @pytest.mark.parametrize(("path", "scenes"), [("thin.toml", 1), (".", 2)])
@@ -98,13 +98,13 @@ def test_a_folder_without_scenes_is_refused(tmp_path, monkeypatch, capsys):
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + FLIGHTS))
 def test_no_drawn_scene_crashes_breaks_or_is_claimed_falsely(seed):
-    judged = judge_draw(seed, OPTIONS, "datasheet", 100.0)
-    assert judged.outcome not in BAD, str(judged)
+    checked = check_draw(seed, OPTIONS, "datasheet", 100.0)
+    assert checked.outcome not in BAD, str(checked)
 
 
 @pytest.mark.parametrize("features", ["geometric", "rendered"])
 def test_the_hard_scenes_can_be_read_and_say_what_they_were(features):
-    files = sorted((Path(judging.__file__).with_name("hard") / features).glob("*.toml"))
+    files = sorted((Path(check.__file__).with_name("hard") / features).glob("*.toml"))
     assert len(files) >= 3
     for file in files:
         assert load_scene(file) != Scene() and file.read_text().startswith("# ")

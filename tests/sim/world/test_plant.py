@@ -198,7 +198,7 @@ def test_forces_of_a_tick_are_those_of_its_physics_steps_in_order():
         each.data.qpos[0] += 0.002 - each.tip[0]  # 2 mm inside the wall: the push changes from step to step
     for _ in range(50):
         plant.step(1.01 * plant.thrusts_actual)
-        single._wanted[:] = 1.01 * single.thrusts_actual
+        single._commanded[:] = 1.01 * single.thrusts_actual
         single._air[:] = single.wind.force(single._centre_velocity.tolist())
         single._drive()
         single._lag[:] = single._lags

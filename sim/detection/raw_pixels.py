@@ -11,7 +11,7 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.picture.lens import Lens
 from ibvs_qp.vision.picture.picture import denormalise, normalise
 
-#: Farthest a point may lie from the corner, in widths of the picture: a lens model bends what is far outside anywhere.
+#: Farthest a point may lie from the corner, in widths of the picture: far outside a lens model is undefined.
 _FARTHEST = 2.0
 
 
@@ -25,7 +25,7 @@ def ideal_pixel(
     return (u, v) if np.isfinite((u, v)).all() else None
 
 
-def as_taken(detection: Any, lens: Lens, frame: RgbdFrame) -> Any:
+def raw_pixels(detection: Any, lens: Lens, frame: RgbdFrame) -> Any:
     """The detection with the end points of its lines in the picture as taken; (rho, theta) stay as they are."""
     if lens.none:
         return detection

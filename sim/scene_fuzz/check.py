@@ -29,7 +29,7 @@ BAD = (FALSE_CLAIM, INTERNAL, CRASHED)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class Checked:
     """One scene."""
 
     name: str  # "seed 7" of a draw, a file's name
@@ -49,23 +49,23 @@ def _short(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def judge_draw(seed: int, options: FlightOptions, world: str, longest_s: float) -> Judged:
-    """Draw the scene of a seed, fly it in a world, and judge the flight by the truth."""
-    return _judged(f"seed {seed}", lambda: drawn_scene(seed, options.features, longest_s), options, world, seed)
+def check_draw(seed: int, options: FlightOptions, world: str, longest_s: float) -> Checked:
+    """Draw the scene of a seed, fly it in a world, and check the flight by the truth."""
+    return _checked(f"seed {seed}", lambda: drawn_scene(seed, options.features, longest_s), options, world, seed)
 
 
-def judge_file(path: Path, options: FlightOptions, world: str, seed: int) -> Judged:
-    """Fly the scene of a file in a world, and judge the flight by the truth."""
-    return _judged(f"{path.stem} {seed}", lambda: (load_scene(path), {}), options, world, seed)
+def check_file(path: Path, options: FlightOptions, world: str, seed: int) -> Checked:
+    """Fly the scene of a file in a world, and check the flight by the truth."""
+    return _checked(f"{path.stem} {seed}", lambda: (load_scene(path), {}), options, world, seed)
 
 
-def _judged(
+def _checked(
     name: str,
     scene_of: Callable[[], tuple[Scene, dict[str, Any]]],
     options: FlightOptions,
     world: str,
     seed: int,
-) -> Judged:
+) -> Checked:
     moved: dict[str, Any] = {}
     try:
         scene, moved = scene_of()
@@ -74,12 +74,12 @@ def _judged(
         trace = fly(scene, options)
         figures = compute_metrics(trace)
     except ConfigError as refusal:
-        return Judged(name=name, moved=moved, outcome=REFUSED, reason=str(refusal))
+        return Checked(name=name, moved=moved, outcome=REFUSED, reason=str(refusal))
     except Exception:  # any other error is a finding
-        return Judged(name=name, moved=moved, outcome=INTERNAL, reason=traceback.format_exc().replace("\n", " | "))
+        return Checked(name=name, moved=moved, outcome=INTERNAL, reason=traceback.format_exc().replace("\n", " | "))
     completed, claimed, push = figures["completed"], figures["claimed"], figures["push_peak_ratio"]
     outcome = (COMPLETE if claimed else UNCLAIMED) if completed else FALSE_CLAIM if claimed else FAILED
     if crashed := trace.reason.startswith(CRASH):
         outcome = CRASHED
     reason = trace.reason if crashed else f"{trace.reason}; {figures['not_completed']}"
-    return Judged(name=name, moved=moved, outcome=outcome, reason=reason, push=push)
+    return Checked(name=name, moved=moved, outcome=outcome, reason=reason, push=push)

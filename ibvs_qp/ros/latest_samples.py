@@ -20,10 +20,10 @@ WAITING = 4
 LATEST_NS = 1_000_000_000
 
 
-class HeldSamples:
+class LatestSamples:
     """Collects messages in the order of their arrival.
 
-    A frame has the last received sample of every sensor with its own stamp, whatever the order of the stamps: the
+    A frame has the last received sample of every sensor with its own stamp, for any order of the stamps: the
     pilot checks their age. Colour and depth are paired by the nearest stamps within ``pair_s``. A message that cannot
     be used is left out and counted.
 

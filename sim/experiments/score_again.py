@@ -1,9 +1,9 @@
-"""Flights of a stored table judged by the truth, as far as their stored figures tell.
+"""Flights of a stored table scored by the truth, as far as their stored figures suffice.
 
-``python -m sim.experiments.judge_again docs/experiments/all.parquet`` prints the section of docs/experiments.md.
+``python -m sim.experiments.score_again docs/experiments/all.parquet`` prints the section of docs/experiments.md.
 
 A table from before `sim.evaluate.truth` has the pilot's claim as ``completed``, and no place of a stroke. Its figures
-still decide many flights: without data on a condition, only what follows from the others counts.
+still decide many flights: without data on a condition, only the others count.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from sim.world.worlds import HARSH, world_name
 HOLDS, FAILS, OPEN = "no fault found", "fails", "not decided"
 
 
-def judge(row: dict[str, Any], run: Run) -> tuple[str, str]:
-    """Outcome of a claimed flight by its stored figures, and what failed or what is unknown."""
+def score(row: dict[str, Any], run: Run) -> tuple[str, str]:
+    """Outcome of a claimed flight by its stored figures, and the failed or unknown criterion."""
     figures = {name: value for name, value in row.items() if isinstance(value, float) and math.isfinite(value)}
     return _paint(figures, run) if isinstance(run.plan.job, PaintJob) else _press(figures, run)
 
@@ -68,14 +68,14 @@ def _press(figures: dict[str, float], run: Run) -> tuple[str, str]:
     return HOLDS, ""
 
 
-def judged(table: pl.DataFrame, runs: list[Run]) -> pl.DataFrame:
+def scored(table: pl.DataFrame, runs: list[Run]) -> pl.DataFrame:
     """Experiment, law, variant, seed, outcome, and why, of every flight that the table holds as completed."""
     by_key = {_key(run.experiment, run.law, run.variant, run.seed, run.params): run for run in runs}
     rows = []
     for row in table.filter(pl.col("completed")).to_dicts():
         names = ("experiment", "law", "variant", "seed")
         run = by_key[_key(row["experiment"], row["law"], row["variant"], row["seed"], parameters(row))]
-        outcome, why = judge(row, run)
+        outcome, why = score(row, run)
         rows.append({name: row[name] for name in names} | {"outcome": outcome, "why": why})
     return pl.DataFrame(rows)
 
@@ -94,8 +94,8 @@ def section(found: pl.DataFrame) -> str:
         rows.append(
             [str(experiment), str(law), str(part.height), *(str(count[o]) for o in (HOLDS, FAILS, OPEN)), words]
         )
-    return markdown(("experiment", "law", "claimed", HOLDS, FAILS, OPEN, "what fails"), rows)
+    return markdown(("experiment", "law", "claimed", HOLDS, FAILS, OPEN, "failed criteria"), rows)
 
 
 if __name__ == "__main__":
-    print(section(judged(pl.read_parquet(Path(sys.argv[1])), designs(ALL, Choice()))), end="")
+    print(section(scored(pl.read_parquet(Path(sys.argv[1])), designs(ALL, Choice()))), end="")

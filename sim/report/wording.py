@@ -1,4 +1,4 @@
-"""What the outcomes and limits of a report mean, in one plain sentence each."""
+"""Meaning of the outcomes and limits of a report, in one plain sentence each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ OUTCOMES = {
     "inaccurate_accepted": "The solver ended with less accuracy, and the result passed the checks.",
     "capped_accepted": "The solver used up its iterations, and the result passed the checks.",
     "exact_fallback": "The solver's result failed the checks; the exact solver answered instead.",
-    "analytic_fallback": "No solution passed the checks, now or shortly before; the analytic law flew this tick.",
+    "analytic_fallback": "No solution passed the checks, now or shortly before; the analytic law controlled this tick.",
     "hold": "Inputs were missing or unusable: the vehicle carried its weight and kept level.",
 }
 #: Meaning of the limits by the beginning of their names.

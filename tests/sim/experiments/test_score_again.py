@@ -1,4 +1,4 @@
-"""Stored flights judged again: only what follows from their figures."""
+"""Stored flights scored again: only what follows from their figures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 
 from sim.evaluate.measures import paint_figures
 from sim.experiments.design import Choice, design
-from sim.experiments.judge_again import FAILS, HOLDS, OPEN, judge, judged, section
 from sim.experiments.page import _claims
+from sim.experiments.score_again import FAILS, HOLDS, OPEN, score, scored, section
 from sim.experiments.spec import experiment
 from sim.sweep.design import Run
 from sim.sweep.parts import PARAM
@@ -33,14 +33,14 @@ PAINT = {"contact_share": 1.0, "stroke_m": 1.3, "coverage": 0.98, "height_error_
 def test_a_paint_job(figures, outcome):
     run = run_of("paint", world="ideal")
     assert run.measure is paint_figures or run.measure.__name__ == "paint_timed_figures"
-    assert judge(PAINT | figures, run) == outcome
+    assert score(PAINT | figures, run) == outcome
 
 
 def test_a_press_and_a_slide():
     slide = run_of("friction", friction=0.3)
-    assert judge({"hold_touched": 1.0, "speed_m_s": 0.09}, slide) == (HOLDS, "")
-    assert judge({"hold_touched": 1.0, "speed_m_s": 0.04}, slide) == (FAILS, "way of the slide")
-    assert judge({"hold_touched": 0.0}, slide) == (FAILS, "touch")
+    assert score({"hold_touched": 1.0, "speed_m_s": 0.09}, slide) == (HOLDS, "")
+    assert score({"hold_touched": 1.0, "speed_m_s": 0.04}, slide) == (FAILS, "way of the slide")
+    assert score({"hold_touched": 0.0}, slide) == (FAILS, "touch")
 
 
 def test_only_claimed_flights_are_judged_and_listed():
@@ -48,7 +48,7 @@ def test_only_claimed_flights_are_judged_and_listed():
     facts = {"experiment": "paint", "law": "qp", "variant": run.variant, "seed": run.seed}
     facts |= {PARAM + name: value for name, value in run.params.items()}
     table = pl.DataFrame([facts | PAINT | {"completed": True, "stroke_m": 1.2}, facts | PAINT | {"completed": False}])
-    found = judged(table, [run])
+    found = scored(table, [run])
     assert found["outcome"].to_list() == [FAILS]
     assert "| paint | qp | 1 | 0 | 1 | 0 | length of the shortest stroke (standard: 1) |" in section(found)
 
