@@ -25,7 +25,7 @@ ROTORS = -1
 
 @dataclass(frozen=True)
 class Channel:
-    """What one field of an input carries.
+    """Content of one field of an input.
 
     Attributes:
         name: The field.
@@ -265,7 +265,7 @@ class SensorFrame:
     """Raw sensors at one control tick, as a vehicle delivers them.
 
     Attributes:
-        stamp_ns: Time of the tick; increases. A step above 1 s is a leap, and is followed within 0.5 s.
+        stamp_ns: Time of the tick; increases. A step above 1 s is a jump, and is followed within 0.5 s.
         attitude: Quaternion (w, x, y, z) of B in I; its yaw is arbitrary.
         angular_velocity: Gyro in B [rad/s], (3,).
         specific_force: Accelerometer in B at the centre of mass [m/s^2], (3,); at rest (0, 0, -9.81).

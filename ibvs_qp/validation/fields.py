@@ -25,7 +25,7 @@ _NO_ARRAY = (-1,)
 
 
 class Field(Channel):
-    """One row of a table of bounds: the channel of an attribute of the input, and what its values must be."""
+    """One row of a table of bounds: the channel of an attribute of the input, and the bounds of its values."""
 
     @property
     def accepted_length(self) -> float:

@@ -19,7 +19,7 @@ from ibvs_qp.validation.numbers import matrix
 LINES_PER_SLOT = 4
 #: Lines and velocities older than this are refused [ns]: the latency of a camera, and some dropped pictures.
 OLDEST_LINE_NS = round(1e9 * channels(Measurement)["lines"].oldest_s)
-#: What a refused measurement lacks.
+#: Fields that a refused measurement lacks.
 _ALL = ("attitude", "angular_velocity", "specific_force", "contact_wrench", "plane", "lines")
 
 

@@ -16,7 +16,7 @@ from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.quaternion import multiply
 from sim.faults.fault import FrameFilter, SensorFault, not_numbers, repeated
 
-#: Stamps of what the unit delivers.
+#: Stamps of the samples of the unit.
 _STAMPS = tuple([channels(SensorFrame)[name].stamp for name in INERTIAL])
 
 
@@ -56,7 +56,7 @@ class ImuLate(SensorFault):
 class ImuNan(SensorFault):
     """Values that are no numbers."""
 
-    output: str = choice("all", "what is no number", ("all", *INERTIAL))
+    output: str = choice("all", "the invalid output", ("all", *INERTIAL))
 
     def filter(self, rng: np.random.Generator) -> FrameFilter:
         """NaN in every entry."""

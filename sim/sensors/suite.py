@@ -45,7 +45,7 @@ class SensorSuite:
             self.models.append(Barometer(scene.barometer, seed))
 
     def sample(self, plant: Plant, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
-        """What the vehicle delivers at this control tick, with the picture or the features that are due."""
+        """Frame of the vehicle at this control tick, with the picture or the features that are due."""
         values: dict[str, Any] = {}
         for model in self.models:
             model.sample(plant)

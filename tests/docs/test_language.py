@@ -74,7 +74,7 @@ def pieces(path: Path) -> Iterator[Piece]:
 
 
 def words(name: str) -> str:
-    """A name as words: `_is_news` is "is news", `ClockJump` "clock leap"."""
+    """A name as words: `_is_news` is "is news", `ClockLeap` "clock leap"."""
     return " ".join(_PARTS_OF_NAMES.findall(name)).lower()
 
 
@@ -117,4 +117,4 @@ def test_every_kept_phrase_is_in_its_file() -> None:
 
 
 def test_names_are_read_as_words() -> None:
-    assert words("_is_news") == "is news" and words("ClockJump") == "clock leap"
+    assert words("_is_news") == "is news" and words("ClockLeap") == "clock leap"
