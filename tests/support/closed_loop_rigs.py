@@ -63,7 +63,7 @@ def hold(scene: Scene, law: str, hold_s: float, seed: int = 0) -> dict[str, np.n
         rows["push"].append(world.plant.contact_normal_force)
         rows["euler_deg"].append(np.degrees(world.plant.euler))
         rows["tip"].append(world.plant.tip[1:])
-        rows["contact"].append(np.array(world.plant.contact_1khz))
+        rows["contact"].append(np.array(world.plant.pushes))
 
     run(pilot, world, lambda: pilot.painter.finished, note)
     return {name: np.array(values) for name, values in rows.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from ibvs_qp import controller
 from ibvs_qp.config import ControllerConfig, LimitSettings
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.measurement import FeatureFrame
@@ -65,6 +67,14 @@ def held(trace: Trace) -> np.ndarray:
 def rocking(trace: Trace) -> float:
     """Largest yaw while held [deg]."""
     return float(np.degrees(np.abs(trace.euler[held(trace), 2])).max())
+
+
+@pytest.fixture(autouse=True)
+def fresh_equations() -> Iterator[None]:
+    """Equations with the patches of the test, which no other test shares."""
+    controller._shipped_problem.cache_clear()
+    yield
+    controller._shipped_problem.cache_clear()
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])

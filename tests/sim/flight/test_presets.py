@@ -90,7 +90,7 @@ def test_the_kept_search_is_what_its_page_says(law: str) -> None:
     cells = {title: dict(zip(("qp", "paper", "mpc"), values, strict=True)) for title, *values in rows}
     assert cells["trials that completed every flight"][law] == str(search["completed_trials"])
     others = len(search["finalists"]) - 1
-    assert cells["finalists that may replace what is shipped"][law].endswith(f" of {others}")
+    assert cells["finalists that may replace the shipped preset"][law].endswith(f" of {others}")
     assert search["chosen"] is None and search["gains"] is None
     failed, path = ([each[key] for each in search["finalists"].values()] for key in ("failed", "scenes"))
     why = cells["why none was chosen"][law]
