@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +15,8 @@ from sim.experiments.losses.__main__ import main, step_times
 from sim.experiments.losses.comparison import Comparison, Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
 
+#: A row of the page: an opponent and four counts.
+_COUNTED = re.compile(r"\|[^|]+(\| \d+ ){4}\|$")
 CELL = {"experiment": "friction", "param.world": "ideal", "param.friction": 0.8}
 
 
@@ -132,6 +136,9 @@ def test_the_page_counts_what_the_table_of_flights_has() -> None:
     page = (folder / "comparisons.md").read_text(encoding="utf-8")
     lost = [each for each in found if each.outcome is Outcome.LOST]
     assert f"{len(lost)} of {len(found):,} are lost" in page
+    outcomes = Counter((each.opponent, each.outcome) for each in found)
+    rows = {tuple(int(cell) for cell in line.split("|")[2:6]) for line in page.splitlines() if _COUNTED.match(line)}
+    assert rows == {tuple(outcomes[name, each] for each in Outcome) for name, _ in outcomes}
     headings = [line for line in page.splitlines() if line.startswith("## ") and " lost" in line]
     words = ("beyond the reach", "rotor", "thrust rate", "touch")
     counts = [sum(_mechanism(each) == word for each in lost) for word in words]
