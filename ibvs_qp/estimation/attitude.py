@@ -23,9 +23,9 @@ NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
 #: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
 #: the direction of gravity.
 RETURN_RATE = math.radians(0.5)
-#: Time constant of the gyro's bias [s]: noise of 0.1 deg a sample leaves 0.02 deg/s. Largest bias [rad/s]: ten times
-#: that of a MEMS gyro without calibration.
-BIAS_TIME, MOST_BIAS = 0.5, math.radians(10.0)
+#: Time constant of the gyro's bias [s]: attitude noise of 0.05 deg a sample passes as 0.05 deg/s, a tenth of the noise of
+#: a MEMS gyro. Largest bias [rad/s]: ten times that of a MEMS gyro without calibration.
+BIAS_TIME, MOST_BIAS = 1.0, math.radians(10.0)
 #: From this bandwidth on the attitude estimate counts as it is [Hz].
 UNFILTERED_HZ = 1000.0
 
