@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ibvs_qp.config import LONGEST_TICK, ControllerConfig, EstimationConfig
-from ibvs_qp.estimation.attitude import continuous_attitude
+from ibvs_qp.estimation.attitude import continuous_attitude, gyro_bias
 from ibvs_qp.estimation.contact import contact_state, no_contact, read_contact
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.force_sensor import contact_wrench
@@ -99,6 +99,7 @@ def prediction_signals(config: ControllerConfig, estimation: EstimationConfig) -
 
     held = GatedSignals(signals, ca.SX(0.0), no(value["measured"]))  # while the attitude is an estimate
     attitude = where(value["measured"], continuous_attitude(held, value["attitude"], rate, dt), value["attitude"])
+    rate -= where(value["measured"], gyro_bias(held, attitude, rate, dt), ca.DM.zeros(3))
     down = gravity_direction(attitude)
     tick = Tick(dt, value["elapsed"], rate, force, ca.SX(1.0), down, value["doubt"])
 
@@ -299,7 +300,7 @@ class Estimator:
         if accepted:
             contact.plane_ns = plane_ns
         self.axes = WallAxes(contact.state.normal, (rx, ry, rz), (dx, dy, dz), (gx, gy, gz))
-        self.attitude = self._row[ATTITUDE].tolist()
+        self.attitude, self.rate = self._row[ATTITUDE].tolist(), self._row[RATE].tolist()
         self.motion.remember(stamp, self._row, dt, density)
         blind = self.motion.velocity_age_s > self._estimation.velocity_life_s
         if frame.height_rate is not None and blind and contact.state.known:

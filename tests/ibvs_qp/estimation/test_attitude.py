@@ -9,7 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 from symbolic_block import Block
 
-from ibvs_qp.estimation.attitude import RETURN_RATE, UNFILTERED_HZ, continuous_attitude, filtered_roll_pitch
+from ibvs_qp.estimation.attitude import (
+    BIAS_TIME,
+    MOST_BIAS,
+    RETURN_RATE,
+    UNFILTERED_HZ,
+    continuous_attitude,
+    filtered_roll_pitch,
+    gyro_bias,
+)
 
 TICK = 0.004
 REST = (0.0, 0.0, 0.0)
@@ -143,3 +151,30 @@ def test_at_the_largest_bandwidth_the_attitude_is_taken_as_it_is() -> None:
     estimate = roll_pitch(UNFILTERED_HZ)
     for _ in range(3):
         np.testing.assert_array_equal(estimate(angles=[0.03, 0.01], rates=[5.0, -5.0]), [0.03, 0.01])
+
+
+def bias_after(seconds: float, bias: float, noise_deg: float = 0.0) -> np.ndarray:
+    """Estimate [rad/s] of a gyro with a bias about all axes, on a vehicle that rolls by 10 deg at 0.5 Hz."""
+    block = Block(
+        lambda signals: gyro_bias(signals, signals.input("attitude", 4), signals.input("rate", 3), signals.input("dt"))
+    )
+    rng, swing, found = np.random.default_rng(2), math.radians(10.0), np.zeros(3)
+    for tick in range(1, round(seconds / TICK) + 1):
+        phase, middle = math.pi * tick * TICK, math.pi * (tick - 0.5) * TICK
+        attitude = quaternion(math.degrees(swing * math.sin(phase)) + rng.normal(0.0, noise_deg), 0.0, 0.0)
+        found = block(attitude=attitude, rate=(swing * math.pi * math.cos(middle) + bias, bias, bias), dt=TICK)
+    return found
+
+
+@pytest.mark.parametrize("bias", [0.0, math.radians(3.0), -math.radians(3.0)])
+def test_the_bias_of_a_gyro_is_found_while_the_vehicle_moves(bias: float) -> None:
+    np.testing.assert_allclose(bias_after(8.0 * BIAS_TIME, bias), bias, atol=5e-4 * abs(bias) + 1e-5)
+
+
+def test_noise_of_the_attitude_is_no_bias() -> None:
+    found = [bias_after(BIAS_TIME + 0.1 * k, 0.0, noise_deg=0.1)[0] for k in range(10)]
+    assert np.abs(found).max() < 3.0 * math.radians(0.1) / BIAS_TIME
+
+
+def test_a_bias_beyond_any_gyro_is_bounded() -> None:
+    np.testing.assert_allclose(bias_after(4.0, 1.0), MOST_BIAS)
