@@ -23,8 +23,8 @@ NOISE_TIME, LONGEST_SAMPLE, MOST_NOISE = 1.0, 0.01, math.radians(0.8)
 #: Rate at which an absorbed step is given back [rad/s]: half a degree per second, slow against the filters that learn
 #: the direction of gravity.
 RETURN_RATE = math.radians(0.5)
-#: Time constant of the gyro's bias [s]: attitude noise of 0.05 deg a sample passes as 0.05 deg/s, a tenth of the noise of
-#: a MEMS gyro. Largest bias [rad/s]: ten times that of a MEMS gyro without calibration.
+#: Time constant of the gyro's bias [s]: attitude noise of 0.05 deg a sample passes as 0.05 deg/s, a tenth of the
+#: noise of a MEMS gyro. Largest bias [rad/s]: ten times that of a MEMS gyro without calibration.
 BIAS_TIME, MOST_BIAS = 1.0, math.radians(10.0)
 #: From this bandwidth on the attitude estimate counts as it is [Hz].
 UNFILTERED_HZ = 1000.0
@@ -86,7 +86,7 @@ def gyro_bias(signals: Signals, attitude: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.S
     turned = _product(_inverse(last), attitude)
     turn = 2.0 * where(turned[0] < 0.0, -1.0, 1.0) * turned[1:]
     bias = signals.state("gyro.bias", 3)
-    difference = rate * dt - turn  # what the gyro turned too far in this tick [rad]
+    difference = rate * dt - turn  # excess turn of the gyro in this tick [rad]
     bias += where(begun, (difference - bias * dt) / BIAS_TIME, ca.DM.zeros(3))
     signals.remember("gyro.begun", ca.SX(1.0))
     signals.remember("gyro.attitude", attitude)

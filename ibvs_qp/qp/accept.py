@@ -9,7 +9,6 @@ import numpy as np
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
-from ibvs_qp.qp.compiled import compiled_solver
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.infeasible import conflicting_rows
 from ibvs_qp.qp.problem import ProgramData, QpProblem
@@ -32,7 +31,11 @@ class QpEngine:
 
     def __init__(self, problem: QpProblem, settings: SolverSettings, data: ProgramData) -> None:
         self.problem, self.settings, self.data = problem, settings, data
-        compiled = compiled_solver(problem, settings, data) if settings.backend == "compiled" else None
+        compiled = None
+        if settings.backend == "compiled":
+            from ibvs_qp.qp.compiled import compiled_solver
+
+            compiled = compiled_solver(problem, settings, data)
         self.solver: Any = compiled or make_solver(problem, settings)  # a Solver, or the one with the test inside
         self._try = compiled.solve if compiled else self._in_python
         self.exact = ExactSolver(problem)

@@ -7,10 +7,10 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.limits.limit import WIDE, Limit
@@ -22,6 +22,9 @@ from ibvs_qp.symbolic.function import ArrayFunction, StepFunction
 from ibvs_qp.symbolic.logic import clamp
 from ibvs_qp.symbolic.signals import stack
 from ibvs_qp.tasks.task import Task
+
+if TYPE_CHECKING:
+    from scipy import sparse  # loaded with the first program
 
 #: More rotors than this have directions without a wrench.
 REDUNDANT_ABOVE = 6
@@ -183,6 +186,8 @@ def _noise_beyond_limits(model: Model, thrusts: ca.SX) -> ca.SX:
 
 
 def _pattern(sparsity: ca.Sparsity) -> sparse.csc_matrix:
+    from scipy import sparse
+
     column, row = sparsity.get_ccs()
     data = np.ones(sparsity.nnz())
     return sparse.csc_matrix((data, row, column), shape=sparsity.shape)

@@ -11,14 +11,16 @@ import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from operator import gt
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
-from scipy import sparse
 
 from ibvs_qp.command import Outcome
 from ibvs_qp.config import SolverSettings
 from ibvs_qp.config.errors import ConfigError
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 #: A row whose multiplier exceeds this is active [cost per unit of the row]. OSQP projects on the bounds, so a free row
 #: has a multiplier of 1e-12 at most; where a row is just touched, its multiplier is uncertain by about `tolerance`

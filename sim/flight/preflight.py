@@ -14,7 +14,7 @@ import numpy as np
 
 from allocation import WrenchFacets, worst_level_reach
 from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, motion_sensitivity
-from ibvs_qp.config import SafetySettings
+from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.frames import GRAVITY, rotation_from_vector
 from ibvs_qp.painting.pattern import PLACE_TOLERANCE_M, ROWS
@@ -289,14 +289,14 @@ def _wind(scene: Scene, config: PilotConfig) -> Iterator[str]:
 
 
 def _period(config: PilotConfig) -> Iterator[str]:
-    """The delay of a tick leaves the loops of the body their margin; gains that lack it at any period are not its."""
+    """A period longer than the default leaves the loops of the body their margin."""
 
     def peak(tick_s: float) -> float:
         return max(motion_sensitivity(dataclasses.replace(config.controller, tick_s=tick_s)).values())
 
     tick = config.controller.tick_s
-    shorter = [steps * 1e-9 * STEP_NS for steps in range(round(tick * 1e9 / STEP_NS) - 1, 0, -1)]
-    if shorter and (found := peak(tick)) > LARGEST_SENSITIVITY:
+    if tick > ControllerConfig().tick_s and (found := peak(tick)) > LARGEST_SENSITIVITY:
+        shorter = [steps * 1e-9 * STEP_NS for steps in range(round(tick * 1e9 / STEP_NS) - 1, 0, -1)]
         good = next((each for each in shorter if peak(each) <= LARGEST_SENSITIVITY), None)
         if good is not None:
             reason = f"the largest sensitivity of a loop is {found:.2f}, allowed is {LARGEST_SENSITIVITY:g}"

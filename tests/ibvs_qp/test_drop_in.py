@@ -76,12 +76,13 @@ def test_a_tick_of_the_laws_loads_no_heavy_part_of_scipy() -> None:
 
 
 def test_every_module_below_vision_loads_in_a_light_installation() -> None:
-    rooms = "adapters analysis estimation export limits model painting presets qp safety tasks validation".split()
+    rooms = "adapters analysis estimation export limits model painting presets qp supervision tasks validation".split()
     walk = (
         "import importlib, pkgutil\n"
         f"for room in map(importlib.import_module, {[f'ibvs_qp.{room}' for room in rooms]}):\n"
         "    for module in pkgutil.walk_packages(room.__path__, room.__name__ + '.'):\n"
-        "        importlib.import_module(module.name)\n"
+        "        if not module.name.startswith('ibvs_qp.qp.solvers.') or module.name.endswith('.osqp'):\n"
+        "            importlib.import_module(module.name)\n"
         "print(*sys.modules)"
     )
     assert {f"ibvs_qp.{room}" for room in rooms} <= loaded(HIDE + walk)

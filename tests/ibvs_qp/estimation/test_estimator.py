@@ -98,6 +98,16 @@ def test_attitude_rate_and_turn_of_a_past_time() -> None:
     np.testing.assert_allclose(hover.estimator.rate_at(then), hover.rate, atol=1e-6)
 
 
+def test_the_bias_of_a_gyro_is_no_rotation() -> None:
+    hover = flown()
+    turn = hover.rate
+    hover.rate = turn + np.radians([3.0, 3.0, -3.0])
+    for _ in range(2000):
+        hover.step()
+    np.testing.assert_allclose(hover.estimator.rate, turn, atol=1e-4)
+    np.testing.assert_allclose(hover.estimator.motion.state[:3], 0.0, atol=5e-3)
+
+
 def test_a_gyro_that_fails_is_replaced_and_the_attitude_goes_on() -> None:
     hover = flown()
     for _ in range(100):

@@ -180,7 +180,7 @@ def test_laws_in_place_of_the_qp_are_compared_with_it_and_without_an_analytic_la
     assert "of 1 comparisons it is better in 0, the QP in 0; 1 do not matter" in page
     assert "of 1 comparisons it is better in 1, the QP in 0; 0 do not matter" in page
     assert "| *mpc* | path error, straights, rms | paint, world datasheet | -2.00" in page
-    assert page.index("What weights") < page.index("## Bounds")
+    assert page.index("Cost of weights") < page.index("## Bounds")
 
 
 @pytest.mark.slow

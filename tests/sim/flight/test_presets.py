@@ -93,7 +93,7 @@ def test_the_kept_search_is_what_its_page_says(law: str) -> None:
     assert cells["finalists that may replace the shipped preset"][law].endswith(f" of {others}")
     assert search["chosen"] is None and search["gains"] is None
     failed, path = ([each[key] for each in search["finalists"].values()] for key in ("failed", "scenes"))
-    why = cells["why none was chosen"][law]
+    why = cells["reason for no choice"][law]
     if law == "qp":
         low, high = (round(100.0 * share) for share in (min(failed[1:]), max(failed[1:])))
         assert why == f"{low} to {high} % of their flights of the choice fail" and not failed[0]
