@@ -106,10 +106,10 @@ static void row_lengths(const ibvs_program *program, uint32_t variables, ibvs_re
 /* The minimiser with the rows of `side` at their bounds, by Cholesky factors of P. With x_0 the solution without limits
  * and S the active rows at their bounds b,
  *   (A_S P^-1 A_S') y = A_S x_0 - b,  x = x_0 - P^-1 A_S' y.
- * along: P^-1 A_i' of every row that was active so far; known: for which rows it is there. */
+ * along: P^-1 A_i' of every row that was active so far, across: A P^-1 A_i'; known: for which rows they are there. */
 static bool solve_active(const ibvs_program *program, const ibvs_real *root, const int8_t side[IBVS_ROWS],
-                         ibvs_real along[IBVS_ROWS][IBVS_VARIABLES], bool known[IBVS_ROWS],
-                         ibvs_real x[IBVS_VARIABLES], ibvs_real y[IBVS_ROWS]) {
+                         ibvs_real along[IBVS_ROWS][IBVS_VARIABLES], ibvs_real across[IBVS_ROWS][IBVS_ROWS],
+                         bool known[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES], ibvs_real y[IBVS_ROWS]) {
   ibvs_real square[IBVS_VARIABLES * IBVS_VARIABLES], at[IBVS_ROWS], level[IBVS_VARIABLES];
   uint32_t active[IBVS_VARIABLES], count = 0;
   for (uint32_t i = 0; i < IBVS_ROWS; ++i) {
@@ -123,6 +123,7 @@ static bool solve_active(const ibvs_program *program, const ibvs_real *root, con
     if (!known[i]) {
       fill_row(program, i, along[i]);
       cholesky_solve(root, IBVS_VARIABLES, along[i]);
+      row_values(program, along[i], across[i]);
       known[i] = true;
     }
     active[count] = i;
@@ -134,9 +135,8 @@ static bool solve_active(const ibvs_program *program, const ibvs_real *root, con
     level[i] = at[active[i]] - (side[active[i]] > 0 ? program->upper[active[i]] : program->lower[active[i]]);
   }
   for (uint32_t j = 0; j < count; ++j) {
-    row_values(program, along[active[j]], at);
     for (uint32_t i = 0; i < count; ++i) {
-      square[i * count + j] = at[active[i]];
+      square[i * count + j] = across[active[j]][active[i]];
     }
   }
   if (!cholesky(square, count)) {
@@ -174,7 +174,8 @@ static int8_t side_of(const ibvs_program *program, uint32_t row, int8_t side, ib
  * every positive definite program. Where the iteration stopped early it takes OSQP's place; in single precision it
  * leaves a tenth of the rounding errors. False where IBVS_PASSES do not suffice. */
 bool ibvs_active_set(const ibvs_program *program, ibvs_real y[IBVS_ROWS], ibvs_real x[IBVS_VARIABLES]) {
-  ibvs_real root[IBVS_VARIABLES * IBVS_VARIABLES], along[IBVS_ROWS][IBVS_VARIABLES], at[IBVS_ROWS], length[IBVS_ROWS];
+  ibvs_real root[IBVS_VARIABLES * IBVS_VARIABLES], along[IBVS_ROWS][IBVS_VARIABLES], across[IBVS_ROWS][IBVS_ROWS];
+  ibvs_real at[IBVS_ROWS], length[IBVS_ROWS];
   bool known[IBVS_ROWS] = {false}, factored = false;
   int8_t side[IBVS_ROWS], next[IBVS_ROWS];
   uint32_t fewest = IBVS_ROWS + 1, tries = BLOCK_TRIES;
@@ -186,7 +187,7 @@ bool ibvs_active_set(const ibvs_program *program, ibvs_real y[IBVS_ROWS], ibvs_r
   for (uint32_t pass = 0; pass < IBVS_PASSES; ++pass) {
     const bool needed = any_side(side);
     if ((needed && !factored && !cholesky(root, IBVS_VARIABLES)) ||
-        !solve_active(program, root, side, along, known, x, y)) {
+        !solve_active(program, root, side, along, across, known, x, y)) {
       return false;
     }
     factored = factored || needed;
