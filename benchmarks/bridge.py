@@ -2,8 +2,8 @@
 
 Run as ``python benchmarks/bridge.py --seconds 60`` on an otherwise idle computer. The bridge, a stand-in for PX4 with
 its camera, and a process that sends garbage run beside each other. No command should answer data older than 20 ms
-(``imu_age_s``), at which the supervisor calls them stale. ``tests/ibvs_qp/bridge/test_loopback.py`` flies the same
-beside other tests, and so allows it one command in a thousand. Needs the extras ``dds`` and ``test``.
+(``imu_age_s``), at which the supervisor calls them stale. ``tests/ibvs_qp/interfaces/px4/test_loopback.py`` flies the
+same beside other tests, and so allows it one command in a thousand. Needs the extras ``dds`` and ``test``.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.export.library import write_library
-from ibvs_qp.export.recorded import write_recorded
+from ibvs_qp.interfaces.c_library.library import write_library
+from ibvs_qp.interfaces.c_library.recorded import write_recorded
 from ibvs_qp.measurement import Measurement, Reference
 from sim.bench.ticks import recorded_ticks
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from ibvs_qp.controller import HybridController
+from ibvs_qp.interfaces.log import Recorder, read_log, replay
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.pilot.runner import run
-from ibvs_qp.recording import Recorder, read_log, replay
 from ibvs_qp.supervision.assured import Assured
 from sim.experiments.scenes import near_wall
 from sim.flight.options import FlightOptions, pilot_config

@@ -38,7 +38,7 @@ def read(tick: int) -> SensorFrame:
 
 
 def drive(thrusts: np.ndarray) -> None:
-    """Thrusts to the motors [N], (n,); `ibvs_qp.adapters.thrust_curve` turns them into motor commands."""
+    """Thrusts to the motors [N], (n,); `ibvs_qp.interfaces.px4.thrust_curve` turns them into motor commands."""
     vehicle.fly(thrusts)
     if vehicle.contact_force[0] < 0.0:
         camera.touch(vehicle.tip_world)

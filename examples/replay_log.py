@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ibvs_qp import ControllerConfig, HybridController, Measurement, Reference
-from ibvs_qp.recording import Recorder, read_log, replay
+from ibvs_qp.interfaces.log import Recorder, read_log, replay
 
 TICK_S = 0.004
 config = ControllerConfig()

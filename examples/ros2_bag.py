@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from ibvs_qp import Pilot, RgbdFrame, SensorFrame, preset
-from ibvs_qp.ros.bag import Bag, commands
-from ibvs_qp.ros.write_bag import write_bag
+from ibvs_qp.interfaces.ros.bag import Bag, commands
+from ibvs_qp.interfaces.ros.write_bag import write_bag
 
 TICK_NS, TICKS, PICTURE_TICKS = 4_000_000, 250, 25  # 250 Hz for 1 s, pictures at 10 Hz
 DISTANCE, SIZE, INTRINSICS = 0.9, (240, 424), (312.6, 312.6, 211.5, 119.5)  # camera to board [m]; [px]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
+from ibvs_qp.former_names import FormerNames
 from ibvs_qp.lazy import public_names
 
+sys.meta_path.insert(0, FormerNames())
 _load, _names = public_names(__name__, __file__)
 __all__ = [*_names, "__version__"]  # pyright: ignore[reportUnsupportedDunderAll]
 

@@ -20,13 +20,13 @@ from ibvs_qp.measurement import Measurement as Measurement
 from ibvs_qp.measurement import Reference as Reference
 from ibvs_qp.measurement import RgbdFrame as RgbdFrame
 from ibvs_qp.measurement import SensorFrame as SensorFrame
-from ibvs_qp.painting.command import PainterInput as PainterInput
-from ibvs_qp.painting.command import PaintingCommand as PaintingCommand
-from ibvs_qp.painting.strategy import Strategy as Strategy
 from ibvs_qp.pilot import FlightStatus as FlightStatus
 from ibvs_qp.pilot import Pilot as Pilot
 from ibvs_qp.pilot import PilotConfig as PilotConfig
-from ibvs_qp.presets import preset as preset
+from ibvs_qp.pilot.painting.command import PainterInput as PainterInput
+from ibvs_qp.pilot.painting.command import PaintingCommand as PaintingCommand
+from ibvs_qp.pilot.painting.strategy import Strategy as Strategy
+from ibvs_qp.pilot.presets import preset as preset
 from ibvs_qp.supervision.assured import Assured as Assured
 
 __version__: str

@@ -15,19 +15,25 @@ ROOT = Path(__file__).parents[1]
 #: Folders in the order of their imports: each imports only from earlier ones (docs/development.md).
 ORDER = {
     "ibvs_qp": (
-        "lazy quaternion frames measurement command axes config flight_state analysis adapters symbolic validation "
-        "estimation model tasks limits qp vision painting checked_law analytic controller export supervision pilot "
-        "presets recording ros bridge"
+        "former_names lazy quaternion frames measurement command axes config flight_state symbolic validation "
+        "estimation model tasks limits qp vision checked_law analytic controller supervision pilot interfaces"
     ).split(),
     "sim": (
         "storage world scenes vehicles sensors rivals faults flight video evaluate scene_fuzz figures sweep report "
         "detection experiments fault_matrix tune notebook bench commands"
     ).split(),
 }
-#: Rooms of vision in the order of its stages: data passes forward.
-STAGES = (
-    "compilation medians config checks picture appearance surface flow lines perception_result overlay paper perception"
-).split()
+#: Parts of a folder in the order of their imports. Those of vision are its stages: data passes forward.
+PARTS = {
+    "vision": (
+        "compilation medians config checks picture appearance surface flow lines perception_result overlay paper "
+        "perception"
+    ).split(),
+    "pilot": "painting config pilot presets".split(),
+    "interfaces": "c_library log ros px4".split(),
+}
+#: Most folders of the controller: more than a newcomer keeps in mind are too many.
+MOST_ROOMS = 12
 #: What every package must not import.
 FORBIDDEN = {
     "allocation": {"ibvs_qp", "sim", "notebooks", "mujoco", "casadi", "osqp", "cv2"},
@@ -117,18 +123,26 @@ def test_rooms_depend_one_way(package: str) -> None:
             assert not later, f"{name} imports {other}: {room} stands before {other.split('.')[1]}"
 
 
-def test_no_stage_of_vision_reaches_back() -> None:
+def test_the_controller_has_few_folders() -> None:
+    assert len([file for file in (ROOT / "ibvs_qp").iterdir() if (file / "__init__.py").exists()]) <= MOST_ROOMS
+
+
+@pytest.mark.parametrize("folder", PARTS)
+def test_no_part_of_a_folder_reaches_back(folder: str) -> None:
+    order = PARTS[folder]
     for name, used in imported_modules("ibvs_qp").items():
-        room = stage_of(name)
+        part = part_of(name, folder)
         for other in used:
-            later = None not in (room, stage_of(other)) and STAGES.index(stage_of(other)) > STAGES.index(room)
-            assert not later, f"{name} imports {other}: {room} stands before {stage_of(other)}"
+            later = None not in (part, part_of(other, folder)) and order.index(part_of(other, folder)) > order.index(
+                part
+            )
+            assert not later, f"{name} imports {other}: {part} stands before {part_of(other, folder)}"
 
 
-def stage_of(module: str) -> str | None:
-    """Room of a module of vision."""
+def part_of(module: str, folder: str) -> str | None:
+    """Part of a folder that a module is in, None outside."""
     parts = module.split(".")
-    return parts[2] if parts[:2] == ["ibvs_qp", "vision"] and len(parts) > 2 else None
+    return parts[2] if parts[:2] == ["ibvs_qp", folder] and len(parts) > 2 and parts[2] in PARTS[folder] else None
 
 
 @pytest.mark.parametrize("package", ORDER)

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from panels import panels
 
 import ibvs_qp
-from ibvs_qp.analysis.contact import contact_mode_damping
+from ibvs_qp.config.contact_margin import contact_mode_damping
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.evaluate.paint_plan import nominal_plan
 from sim.flight.closed_loop import fly

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from allocation import control_effectiveness
-from ibvs_qp.config import contact_margin
 from ibvs_qp.config.contact import BrushSettings, ContactSettings, contact_values
+from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.estimation import AngularRateSettings
 from ibvs_qp.config.gains import LAWS, Gains, Weights, scaled_gains
@@ -98,7 +98,7 @@ class ControllerConfig(Checked):
     def from_toml(cls, file: str | Path) -> ControllerConfig:
         """Read a preset; ConfigError names field, value, unit and allowed range, also where the contact would ring."""
         config = load_toml(cls, file)
-        contact_margin.require_margin(config, config.brush, f"{file}: ")
+        require_margin(config, config.brush, f"{file}: ")
         return config
 
     def to_toml(self, *, derived: bool = False) -> str:

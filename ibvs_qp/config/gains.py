@@ -21,7 +21,7 @@ _PAPER = {"theta_kp": 7.65, "theta_kd": 13.59, "body_rotation_gain": 0.3843}
 #: Power of seconds in the denominator of a unit: slower motors reduce gains of that unit by it.
 _PER_SECOND = {"1/s": 1, "1/s^2": 2, "1/s^3": 3, "N s/m": 1, "N/m": 2}
 #: Longest filter of a row [s]. An approach is unstable with 0.5 s. With 0.1 s it has M_s 2.2, but level flight 32 and
-#: lines 11; with the shipped filters 1.7 at most (`ibvs_qp.analysis.motion`).
+#: lines 11; with the shipped filters 1.7 at most (`ibvs_qp.model.motion_margin`).
 LONGEST_FILTER = 0.1
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from allocation import control_effectiveness
-from ibvs_qp.analysis.motion import TICKS_LATE
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import GRAVITY, down_in_body, roll_pitch
 from ibvs_qp.measurement import Measurement
+from ibvs_qp.model.motion_margin import TICKS_LATE
 
 #: Attitude gain times the square of the time to act, and rate gain times it [-]: lag of the motors and delay of a
 #: tick. Peak of sensitivity 1.7, and 2.1 where the motors lag 1.6 times as long. The gains of the law, stiffer by its

@@ -13,10 +13,10 @@ from ibvs_qp.estimation.turned_camera import TurnedCamera
 from ibvs_qp.estimation.wall_lines import WallAxes, image_line
 from ibvs_qp.frames import down_in_body
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame, RgbdFrame, SensorFrame
-from ibvs_qp.painting.command import ExpectedEdge
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.contact_picture import hint_span
 from ibvs_qp.pilot.estimation import Plane
+from ibvs_qp.pilot.painting.command import ExpectedEdge
 from ibvs_qp.pilot.perception_loader import PerceptionLoader
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features

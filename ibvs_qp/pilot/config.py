@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ibvs_qp.analysis.contact import require_margin
 from ibvs_qp.config import ControllerConfig, EstimationConfig, SafetySettings
+from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.gains import LAWS
 from ibvs_qp.config.settings import choice, derive, dump_toml, load_toml, setting, validate
 from ibvs_qp.frames import to_camera
 from ibvs_qp.measurement import SensorFrame, channels
-from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.pattern import Pattern
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.painting.pattern import Pattern
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings

@@ -11,9 +11,9 @@ from ibvs_qp.config.field_of_view import camera_rotation, field_of_view, picture
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
 from ibvs_qp.measurement import HORIZONTAL
-from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.painting.pattern import Pattern
 from ibvs_qp.vision.picture.mask import propeller_mask, vehicle_mask
 
 #: Least distance of camera and wall that is computed with [m].

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot.config import PilotConfig
+from ibvs_qp.pilot.painting.pattern import Pattern
 from ibvs_qp.validation.failure import raised
 
 if TYPE_CHECKING:

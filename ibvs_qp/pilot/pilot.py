@@ -22,10 +22,10 @@ from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.flight_state import FlightState, put_state, take_state
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
-from ibvs_qp.painting.strategy import Strategy
 from ibvs_qp.pilot.camera import CameraInput
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.estimation import Estimation
+from ibvs_qp.pilot.painting.strategy import Strategy
 from ibvs_qp.pilot.planning import FLYING, Planning
 from ibvs_qp.pilot.push_report import PushReport
 from ibvs_qp.pilot.status import Event, FlightStatus

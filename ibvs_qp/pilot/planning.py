@@ -11,11 +11,11 @@ from ibvs_qp.command import SafetyState
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.frames import to_camera
 from ibvs_qp.measurement import Reference
-from ibvs_qp.painting.command import PainterInput, PaintingCommand, image_reference
-from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.strategy import Strategy, require_strategy
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.estimation import ASSUMED_DISTANCE, Estimation
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand, image_reference
+from ibvs_qp.pilot.painting.painter import Painter
+from ibvs_qp.pilot.painting.strategy import Strategy, require_strategy
 from ibvs_qp.supervision.supervision import Limits, Supervision
 
 #: States in which the strategy has control.

@@ -21,7 +21,7 @@ class FlightStatus:
     """State of a flight after the last tick.
 
     Attributes:
-        phase: Phase of the strategy, one of `ibvs_qp.painting.strategy.PHASES`.
+        phase: Phase of the strategy, one of `ibvs_qp.pilot.painting.strategy.PHASES`.
         finished: Whether the flight has ended: nothing more happens, the vehicle may be taken over.
         failed: Whether the job was not, or will not be, completed.
         reason: Why it ended or failed; empty until then.

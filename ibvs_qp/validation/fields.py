@@ -161,5 +161,5 @@ def field_table(kind: type, rotors: int = 0) -> FieldTable:
 SENSOR_FRAME, FEATURE_FRAME = field_table(SensorFrame), field_table(FeatureFrame)
 #: Targets of a controller: a fault rejects the whole reference.
 REFERENCE = field_table(Reference)
-#: Targets of a strategy (`ibvs_qp.painting.command.PaintingCommand`).
+#: Targets of a strategy (`ibvs_qp.pilot.painting.command.PaintingCommand`).
 PAINTING_COMMAND = FieldTable(replace(REFERENCE.rows[0], name="push"), *REFERENCE.rows[1:])

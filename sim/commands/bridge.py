@@ -11,8 +11,8 @@ from ibvs_qp.config.errors import out_of_range
 from sim.commands.options import flag, optional, preset_file
 
 if TYPE_CHECKING:
-    from ibvs_qp.bridge.bridge import Bridge
-    from ibvs_qp.bridge.config import BridgeConfig
+    from ibvs_qp.interfaces.px4.bridge import Bridge
+    from ibvs_qp.interfaces.px4.config import BridgeConfig
     from ibvs_qp.pilot import PilotConfig
     from ibvs_qp.pilot.runner import Timing
     from sim.commands.status_lines import StatusLines
@@ -43,7 +43,7 @@ class BridgeCommand:
 
     def run(self, words: list[str]) -> int:
         """Run the bridge, or print its plan."""
-        from ibvs_qp.bridge.config import BridgeConfig
+        from ibvs_qp.interfaces.px4.config import BridgeConfig
         from sim.commands.status_lines import StatusLines
         from sim.flight.stop import handled_ctrl_c
         from sim.report.rundir import as_json
@@ -56,7 +56,7 @@ class BridgeCommand:
             plan = _plan(config, flight)
             print(as_json(plan)) if self.json else _show(plan)
             return 0
-        from ibvs_qp.bridge.bridge import Bridge
+        from ibvs_qp.interfaces.px4.bridge import Bridge
 
         bridge, timing, lines = Bridge(config, flight), None, None if self.json else StatusLines()
         interrupts = list[bool]()
@@ -131,10 +131,10 @@ def _summary(bridge: Bridge, timing: Timing | None) -> str:
 
 def _plan(config: BridgeConfig, flight: PilotConfig) -> dict[str, Any]:
     """Inputs, outputs and conditions of the bridge; refuses settings that do not fit the vehicle."""
-    from ibvs_qp.bridge.bridge import checks
-    from ibvs_qp.bridge.dds import dds_topic, dds_type
-    from ibvs_qp.bridge.inputs import subscriptions
-    from ibvs_qp.bridge.outputs import Outputs, publications
+    from ibvs_qp.interfaces.px4.bridge import checks
+    from ibvs_qp.interfaces.px4.dds import dds_topic, dds_type
+    from ibvs_qp.interfaces.px4.inputs import subscriptions
+    from ibvs_qp.interfaces.px4.outputs import Outputs, publications
 
     curve = Outputs(config, flight.controller.vehicle).curve
     reads = {each.topic: each.type_name for each in subscriptions(config)}

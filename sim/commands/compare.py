@@ -62,7 +62,7 @@ class Compare:
 
     def run(self, words: list[str]) -> int:
         """Read or fly both, and print the differences."""
-        from ibvs_qp.presets import FILES
+        from ibvs_qp.pilot.presets import FILES
 
         a, b = (path if path.exists() else FILES.get(str(path), path) for path in (self.run_a, self.run_b))
         return dataclasses.replace(self, run_a=a, run_b=b)._compare(words)

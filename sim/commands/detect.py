@@ -122,8 +122,8 @@ class Detect:
     def _pictures(self, path: Path, update: Callable[[str], None], folder: Path | None) -> list[FrameResult]:
         """Results of the pictures of a bag."""
         from ibvs_qp.config.settings import load_toml
-        from ibvs_qp.ros.bag import Bag
-        from ibvs_qp.ros.topics import Topics
+        from ibvs_qp.interfaces.ros.bag import Bag
+        from ibvs_qp.interfaces.ros.topics import Topics
         from sim.detection.overlay import write_overlay
         from sim.detection.run import detect_bag
         from sim.evaluate.table import plain

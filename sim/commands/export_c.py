@@ -34,8 +34,8 @@ class ExportC:
         from rich.console import Console
 
         from ibvs_qp.config.errors import ConfigError
-        from ibvs_qp.export.library import write_library
-        from ibvs_qp.export.recorded import write_recorded
+        from ibvs_qp.interfaces.c_library.library import write_library
+        from ibvs_qp.interfaces.c_library.recorded import write_recorded
         from ibvs_qp.pilot import PilotConfig
         from sim.bench.ticks import press_ticks
         from sim.flight.working import working

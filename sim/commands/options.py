@@ -92,7 +92,7 @@ def preset_file(file: Path | None, option: str = "--preset", *, other_formats: b
 
 
 def _shipped_or_given(file: Path | None, option: str, kind: str, other_formats: bool = False) -> Path | None:
-    from ibvs_qp import presets
+    from ibvs_qp.pilot import presets
     from sim import scenes
 
     if file is None:

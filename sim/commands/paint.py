@@ -115,7 +115,7 @@ class Paint:
         started = time.perf_counter()
         check_seed(self.seed)
         if self.log == "mcap":
-            importlib.import_module("ibvs_qp.recording")  # refused without the extra
+            importlib.import_module("ibvs_qp.interfaces.log")  # refused without the extra
         chosen, preset = scene_file(self.scene), preset_file(self.preset)
         scene, world = scene_in_world(chosen, self.world)
         vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
@@ -209,7 +209,7 @@ class Paint:
             if folder.report.exists():
                 print(f"Report: {folder.report}")
             for file in folder.logs():
-                from ibvs_qp.recording import FOXGLOVE_LAYOUT
+                from ibvs_qp.interfaces.log import FOXGLOVE_LAYOUT
 
                 print(f"Log: {file}; layout for Foxglove: {FOXGLOVE_LAYOUT}")
         if (false := false_claims(metrics)) and not interrupted:

@@ -13,7 +13,7 @@ from ibvs_qp.config.errors import ConfigError
 from sim.commands.options import flag, optional, preset_file
 
 if TYPE_CHECKING:
-    from ibvs_qp.recording import PresetComparison, RecordedFlight, Replay
+    from ibvs_qp.interfaces.log import PresetComparison, RecordedFlight, Replay
 
 #: Answer for a log without a tick to compare.
 NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
@@ -27,7 +27,7 @@ class ReplayCommand:
     """
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
-    """MCAP log of paint --log mcap, or of ibvs_qp.recording.Recorder; also the log of a killed process."""
+    """MCAP log of paint --log mcap, or of ibvs_qp.interfaces.log.Recorder; also the log of a killed process."""
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset file (TOML), or a shipped one: show its commands on the same inputs instead."""
     repair: Annotated[Path | None, optional("FILE")] = None
@@ -39,8 +39,8 @@ class ReplayCommand:
         """Replay and print."""
         from rich.console import Console
 
+        from ibvs_qp.interfaces.log import compare_preset, read_log, repair, replay
         from ibvs_qp.pilot import PilotConfig
-        from ibvs_qp.recording import compare_preset, read_log, repair, replay
         from sim.flight.working import working
         from sim.report.rundir import as_json
 
@@ -70,7 +70,7 @@ def _summary(flight: RecordedFlight, result: Replay | PresetComparison) -> dict[
 
 def _text(flight: RecordedFlight, result: Replay | PresetComparison) -> list[str]:
     from ibvs_qp import __version__
-    from ibvs_qp.recording import PresetComparison
+    from ibvs_qp.interfaces.log import PresetComparison
 
     lines = _preset_text(result) if isinstance(result, PresetComparison) else _replay_text(result)
     if flight.facts["version"] != __version__:

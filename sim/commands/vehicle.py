@@ -52,8 +52,8 @@ class Vehicle:
 
     def run(self, words: list[str]) -> int:
         """Analyse and print."""
-        from ibvs_qp.adapters.px4 import to_px4
         from ibvs_qp.config.errors import ConfigError
+        from ibvs_qp.interfaces.px4.rotors import to_px4
         from ibvs_qp.pilot import PilotConfig
         from ibvs_qp.pilot.vehicle_check import VehicleCheck, check_vehicle, rotor_problems, vehicle_actuation
         from sim.report.rundir import as_json

@@ -18,7 +18,7 @@ from sim.detection.pictures import PictureError, read_frame
 from sim.detection.raw_pixels import ideal_pixel, raw_pixels
 
 if TYPE_CHECKING:
-    from ibvs_qp.ros.bag import Bag
+    from ibvs_qp.interfaces.ros.bag import Bag
 
 #: Frame interval of a sequence of unknown rate [ns]: 30 Hz.
 _INTERVAL_NS = 33_333_333

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ibvs_qp.analysis.contact import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.command import Outcome
+from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.explanation import push_reduction, rejections, thrust_window, trim_tilt
 from sim.evaluate.table import plain, terminal_table

@@ -1,4 +1,4 @@
-"""Painted strokes against their nominal lines, in pattern coordinates (u, v) [m] of `ibvs_qp.painting.pattern`.
+"""Painted strokes against their nominal lines, in pattern coordinates (u, v) [m] of `ibvs_qp.pilot.painting.pattern`.
 
 Stroke k belongs on the line v = `BoardGeometry.stroke_place`, counted from the board's edge, independent of the
 strokes before it. A stroke's line is the mean of its tip path over pieces along u, of the part on the board in contact;
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.painting.stroke_map import band_edge
+from ibvs_qp.pilot.painting.stroke_map import band_edge
 from sim.evaluate.paint_plan import BIN_M, averaged
 from sim.evaluate.window import CONTACT_N, board_tip, in_phase, physics_ticks
 from sim.flight.trace import Trace

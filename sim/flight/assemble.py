@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.command import Outcome
-from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.strategy import PHASES
 from sim.flight.flight_truth import euler_angles, in_body, rotations
 from sim.flight.options import ticks_in
 from sim.sensors.cameras.protocol import camera_intrinsics

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ibvs_qp.frames import to_camera
-from ibvs_qp.painting.pattern import Pattern
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.pattern import Pattern
 
 #: Spacing of the points at which a line is tested [m]: a pixel is 0.8 mm at 640x480 and 0.5 m.
 STEP_M = 0.001

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ibvs_qp.config.settings import setting, validate
-from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.presser import Presser
-from ibvs_qp.painting.strategy import Strategy, require_strategy
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.painting.painter import Painter
+from ibvs_qp.pilot.painting.presser import Presser
+from ibvs_qp.pilot.painting.strategy import Strategy, require_strategy
 from sim.flight.own_class import built
 
 

@@ -11,13 +11,13 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 
 from ibvs_qp.command import Command
 from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.interfaces.log.messages import encode
+from ibvs_qp.interfaces.log.recorder import Recorder
+from ibvs_qp.interfaces.log.scene import WALL, box, pose_in_frame, quaternion, shapes, transform, vehicle_scene
+from ibvs_qp.interfaces.log.topics import POSE_NS, SHAPE_NS
+from ibvs_qp.interfaces.log.writer import LogWriter
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
-from ibvs_qp.recording.messages import encode
-from ibvs_qp.recording.recorder import Recorder
-from ibvs_qp.recording.scene import WALL, box, pose_in_frame, quaternion, shapes, transform, vehicle_scene
-from ibvs_qp.recording.topics import POSE_NS, SHAPE_NS
-from ibvs_qp.recording.writer import LogWriter
 from sim.flight.surroundings import World
 from sim.world.readout import PLACES
 

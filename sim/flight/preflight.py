@@ -13,12 +13,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from allocation import WrenchFacets, worst_level_reach
-from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.frames import GRAVITY, rotation_from_vector
-from ibvs_qp.painting.pattern import PLACE_TOLERANCE_M, ROWS
+from ibvs_qp.model.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.pattern import PLACE_TOLERANCE_M, ROWS
 from sim.flight.contact_view import STEP_M, ContactView
 from sim.flight.jobs import Job, PaintJob
 from sim.world.board import BoardGeometry

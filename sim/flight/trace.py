@@ -95,7 +95,7 @@ class Trace:
     seed: int  # its seed
     law: str  # "qp" or "paper"
     arrays: dict[str, np.ndarray] = field(default_factory=dict)  # see `FIELDS`
-    phases: tuple[str, ...] = ()  # names of the phases, as `ibvs_qp.painting.strategy.PHASES`
+    phases: tuple[str, ...] = ()  # names of the phases, as `ibvs_qp.pilot.painting.strategy.PHASES`
     outcomes: tuple[str, ...] = ()  # names of the outcomes
     limits: tuple[str, ...] = ()  # names of the limits, columns of ``active``
     events: list[Event] = field(default_factory=list)  # phase changes and other events in order

@@ -12,8 +12,8 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile, parse_toml, read_bytes
 from ibvs_qp.config.settings import from_dict
-from ibvs_qp.painting.strategy import PHASES
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.strategy import PHASES
 from sim.flight.assemble import OUTCOMES, Flown, LoggedRows, assemble
 from sim.flight.columns import split
 from sim.flight.journal import NOTES, ROWS, Header

@@ -11,10 +11,10 @@ from ibvs_qp.analytic import RANK_TOLERANCE, analytic_thrusts
 from ibvs_qp.config import ControllerConfig, Gains, Weights
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Measurement, Reference
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.presser import Presser
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.painting.painter import Painter
+from ibvs_qp.pilot.painting.presser import Presser
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.solvers.osqp import osqp_settings
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 import ibvs_qp
-from ibvs_qp.analysis.contact import require_margin
+from ibvs_qp.config.contact_margin import require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.presets import FILES
+from ibvs_qp.pilot.presets import FILES
 from sim.evaluate.window import phase_window
 from sim.flight.trace import Trace
 from sim.notebook.knobs import KNOBS, knob_values, turned

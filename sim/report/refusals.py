@@ -17,9 +17,9 @@ ROOT = Path(__file__).parents[2]
 _BLOCK = re.compile(r"<!-- (?P<places>[\w/. ]+): generated -->\n.*?<!-- end of texts -->", re.DOTALL)
 #: Folders and modules that step in flight or give the reason of its end: every sentence in them is a message.
 _IN_FLIGHT = (
-    "ibvs_qp/bridge/bridge.py ibvs_qp/bridge/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
+    "ibvs_qp/interfaces/px4/bridge.py ibvs_qp/interfaces/px4/gate.py ibvs_qp/checked_law.py ibvs_qp/controller.py "
     "ibvs_qp/estimation ibvs_qp/symbolic/machine_code.py ibvs_qp/model/reporting.py ibvs_qp/qp/compiled.py "
-    "ibvs_qp/painting ibvs_qp/pilot ibvs_qp/qp/infeasible.py ibvs_qp/supervision "
+    "ibvs_qp/pilot/painting ibvs_qp/pilot ibvs_qp/qp/infeasible.py ibvs_qp/supervision "
     "ibvs_qp/validation ibvs_qp/vision"
 ).split()
 #: Elsewhere messages are the texts of errors: raised, or prepared in a variable of such a name.

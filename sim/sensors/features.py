@@ -14,7 +14,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import camera_twist_matrix
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, FeatureFrame
-from ibvs_qp.painting.pattern import COLUMNS
+from ibvs_qp.pilot.painting.pattern import COLUMNS
 from ibvs_qp.symbolic.function import BoundFunction
 from sim.sensors.cameras.arm import vehicle_mask
 from sim.sensors.cameras.exposure import Dropouts

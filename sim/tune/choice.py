@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ibvs_qp.analysis.contact import least_margin
+from ibvs_qp.config.contact_margin import least_margin
 from ibvs_qp.pilot import PilotConfig
 from sim.evaluate.figures import FIGURES
 from sim.tune.objectives import OBJECTIVES, Score, ratios

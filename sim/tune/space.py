@@ -6,11 +6,11 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 
-from ibvs_qp.analysis.contact import STIFFNESS_RATIOS, contact_sensitivity, require_margin
-from ibvs_qp.analysis.motion import LAG_RATIOS, LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, motion_sensitivity
+from ibvs_qp.config.contact_margin import STIFFNESS_RATIOS, contact_sensitivity, require_margin
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.gains import gain_factors
 from ibvs_qp.config.settings import dump_toml
+from ibvs_qp.model.motion_margin import LAG_RATIOS, LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
 from sim.rivals.horizon import MpcSettings
 

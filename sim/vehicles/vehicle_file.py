@@ -7,11 +7,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ibvs_qp.adapters.px4 import DEFAULTS, read_px4
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import LARGEST_TOML, parse_toml, read_bytes
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.interfaces.px4.rotors import DEFAULTS, read_px4
 from ibvs_qp.pilot import PilotConfig
 from sim.vehicles.model_file import read_model
 

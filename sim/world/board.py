@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.painting.pattern import ROWS, Pattern, stroke_count, stroke_place
+from ibvs_qp.pilot.painting.pattern import ROWS, Pattern, stroke_count, stroke_place
 from sim.world.scene import Scene
 
 

@@ -20,8 +20,8 @@ _FLATNESS = 1.0
 class PaintedEdges:
     """Outermost painted v at every u for every stroke (round brush: its centre plus its radius).
 
-    Pattern coordinates (u, v) are those of `ibvs_qp.painting.pattern`; the outer edge of a stroke is the one on the
-    side of the next stroke.
+    Pattern coordinates (u, v) are those of `ibvs_qp.pilot.painting.pattern`; the outer edge of a stroke is the one on
+    the side of the next stroke.
 
     Attributes:
         outer: That v [m], -inf without paint, (strokes + 1, bins); stroke 0 is empty.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
 from ibvs_qp.measurement import SensorFrame, channels
-from ibvs_qp.painting.pattern import CORNERS, FILL, PATTERNS
+from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
 

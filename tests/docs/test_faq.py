@@ -51,7 +51,7 @@ def test_texts_of_a_module(source: str, in_flight: bool, found: list[str]) -> No
 
 
 def test_the_reasons_of_the_bridge_are_found() -> None:
-    bridge, gate = (refusals.refusals()[f"ibvs_qp/bridge/{name}.py"] for name in ("bridge", "gate"))
+    bridge, gate = (refusals.refusals()[f"ibvs_qp/interfaces/px4/{name}.py"] for name in ("bridge", "gate"))
     assert {"rest of the vehicle for the self-check", "flight ended: …"} <= set(bridge) and "link lost: …" in gate
 
 

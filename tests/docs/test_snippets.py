@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from ibvs_qp.bridge.config import BridgeConfig
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.interfaces.px4.config import BridgeConfig
 from ibvs_qp.pilot import PilotConfig
 from sim.commands import cli
 from sim.experiments.spec import Experiment

@@ -20,8 +20,8 @@ from ibvs_qp import Assured, Command, HybridController, PaperController, Pilot, 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.flight_state import FlightState
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.strategy import Strategy
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.painting.strategy import Strategy
 from tests.replay.cases import CASES
 
 #: Ticks for which a copy is compared.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp import HybridController, PaperController, Pilot, PilotConfig, SafetySettings
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.presets import FOLDER
 
 from . import internals
 

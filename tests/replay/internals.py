@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp import FeatureFrame, Measurement, Pilot, Reference
-from ibvs_qp.painting.presser import Presser
+from ibvs_qp.pilot.painting.presser import Presser
 
 
 def program(controller: Any) -> dict[str, np.ndarray] | None:

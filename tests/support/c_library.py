@@ -14,8 +14,8 @@ from recorded_inputs import recording
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController, qp_problem
-from ibvs_qp.export.library import write_library
-from ibvs_qp.export.recorded import write_recorded
+from ibvs_qp.interfaces.c_library.library import write_library
+from ibvs_qp.interfaces.c_library.recorded import write_recorded
 
 #: Compiles in a third of the time of -O2.
 FLAGS = "CFLAGS=-O1 -Werror"

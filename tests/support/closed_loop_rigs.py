@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.painter import Painter
 from ibvs_qp.pilot import Pilot
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.painting.painter import Painter
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions, pilot_config

@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from ibvs_qp.bridge.config import BridgeConfig
-from ibvs_qp.bridge.dds import Participant, Writer
-from ibvs_qp.bridge.inputs import subscriptions
-from ibvs_qp.ros import pictures, samples
-from ibvs_qp.ros.messages import encoded
+from ibvs_qp.interfaces.px4.config import BridgeConfig
+from ibvs_qp.interfaces.px4.dds import Participant, Writer
+from ibvs_qp.interfaces.px4.inputs import subscriptions
+from ibvs_qp.interfaces.ros import pictures, samples
+from ibvs_qp.interfaces.ros.messages import encoded
 
 #: Port of a participant's unicast data (RTPS standard): base, gains per domain and participant, and offset.
 BASE, PER_DOMAIN, PER_PARTICIPANT, USER = 7400, 250, 2, 11

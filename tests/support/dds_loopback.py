@@ -45,7 +45,7 @@ def domain(name: str) -> int:
 def require_dds() -> None:
     """Skip where DDS cannot start."""
     pytest.importorskip("cyclonedds", reason="needs the extra dds")
-    code = "from ibvs_qp.bridge.dds import Participant; Participant(231)"
+    code = "from ibvs_qp.interfaces.px4.dds import Participant; Participant(231)"
     done = subprocess.run([sys.executable, "-c", code], env=environment(), capture_output=True, text=True, timeout=60)
     if done.returncode != 0:
         pytest.skip(f"DDS cannot start on the loopback interface: {done.stderr.strip().splitlines()[-1]}")

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ibvs_qp.ros.messages import CAMERA_INFO, IMAGE, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, encoded, message
-from ibvs_qp.ros.pictures import from_depth, from_intrinsics, from_rgb
-from ibvs_qp.ros.samples import to_wrench
+from ibvs_qp.interfaces.ros.messages import (
+    CAMERA_INFO,
+    IMAGE,
+    SENSOR_COMBINED,
+    VEHICLE_ATTITUDE,
+    WRENCH,
+    encoded,
+    message,
+)
+from ibvs_qp.interfaces.ros.pictures import from_depth, from_intrinsics, from_rgb
+from ibvs_qp.interfaces.ros.samples import to_wrench
 
 NOW = 1_700_000_000_000_000_000
 

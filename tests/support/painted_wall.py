@@ -16,11 +16,11 @@ import pytest
 
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.config import PaintingConfig
-from ibvs_qp.painting.painter import Painter
-from ibvs_qp.painting.pattern import Pattern, stroke_place
-from ibvs_qp.painting.strategy import PHASES
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.painting.painter import Painter
+from ibvs_qp.pilot.painting.pattern import Pattern, stroke_place
+from ibvs_qp.pilot.painting.strategy import PHASES
 
 TICK = 0.04
 #: What the camera shows around the tip at the wall [m]; it grows with the camera's distance, and its axis lies below.

@@ -22,15 +22,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from small_vehicle import SmallVehicle
 
-from ibvs_qp.adapters.thrust_curve import ThrustCurve
-from ibvs_qp.bridge.dds import Participant
-from ibvs_qp.bridge.inputs import CONTROL_MODE
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.frames import R_BODY_CAMERA, cross
-from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.pilot.runner import run
-from ibvs_qp.ros import pictures, samples
-from ibvs_qp.ros.messages import (
+from ibvs_qp.interfaces.px4.dds import Participant
+from ibvs_qp.interfaces.px4.inputs import CONTROL_MODE
+from ibvs_qp.interfaces.px4.thrust_curve import ThrustCurve
+from ibvs_qp.interfaces.ros import pictures, samples
+from ibvs_qp.interfaces.ros.messages import (
     CAMERA_INFO,
     IMAGE,
     SENSOR_COMBINED,
@@ -40,7 +38,9 @@ from ibvs_qp.ros.messages import (
     message,
     to_px4,
 )
-from ibvs_qp.ros.topics import Px4Topics
+from ibvs_qp.interfaces.ros.topics import Px4Topics
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.pilot.runner import run
 
 #: Size, focal length [px] and principal point of the camera.
 SHAPE, FOCAL, CENTRE = (240, 424), 312.6, (211.5, 119.5)

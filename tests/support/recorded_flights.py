@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from recorded_inputs import recording
 
-from ibvs_qp.recording import Recorder
+from ibvs_qp.interfaces.log import Recorder
 from ibvs_qp.supervision.assured import Assured
 from tests.replay.broken import broken
 from tests.replay.cases import CASES

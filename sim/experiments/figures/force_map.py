@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import ibvs_qp
-from ibvs_qp.analysis.contact import contact_mode_damping
+from ibvs_qp.config.contact_margin import contact_mode_damping
 from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.spec import FigureSpec
 from sim.experiments.variants import VARIANTS, with_force_gain

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from ibvs_qp.painting.pattern import COLUMNS, CORNERS, PATTERNS, ROWS
+from ibvs_qp.pilot.painting.pattern import COLUMNS, CORNERS, PATTERNS, ROWS
 from sim.experiments.scenes import changed
 from sim.scenes import FILES
 from sim.world.random_streams import stream

@@ -12,7 +12,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import to_camera
-from ibvs_qp.painting.pattern import CORNERS, PATTERNS, Pattern
+from ibvs_qp.pilot.painting.pattern import CORNERS, PATTERNS, Pattern
 from sim.experiments.scenes import near_wall
 from sim.faults.fault import Fault
 from sim.faults.features import FeatureFault

@@ -13,8 +13,8 @@ import pytest
 
 import ibvs_qp
 from allocation import Rotor, RotorGeometry
-from ibvs_qp.analysis.contact import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.config import ConfigError, ContactSettings, ControllerConfig, Gains, LimitSettings, VehicleParams
+from ibvs_qp.config.contact_margin import LEAST_DAMPING_RATIO, least_margin
 from ibvs_qp.config.field_of_view import field_of_view
 from ibvs_qp.config.settings import Derived, from_dict, to_dict
 from ibvs_qp.estimation.turned_camera import TurnedCamera, straightened

@@ -26,8 +26,8 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, dump_toml, from_dict, load_toml, setting, validate
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import Reference
-from ibvs_qp.painting.config import LineGates, PaintingConfig
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.config import LineGates, PaintingConfig
 
 TREES = [
     ControllerConfig,

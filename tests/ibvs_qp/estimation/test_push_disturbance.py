@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from symbolic_block import Block
 
-from ibvs_qp.analysis.contact import ContactLoop
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_margin import ContactLoop
 from ibvs_qp.estimation.push_disturbance import FORCE_BOUND, SLOW_BOUND, Normal, PushDisturbance
 
 CONFIG = ControllerConfig()

@@ -11,11 +11,11 @@ from symbolic_block import Block
 
 import ibvs_qp
 from allocation import control_effectiveness
-from ibvs_qp.analysis.motion import LARGEST_SENSITIVITY, MotionLoop, motion_sensitivity
 from ibvs_qp.config import AngularRateSettings, ConfigError, ControllerConfig, Gains
 from ibvs_qp.config.gains import LONGEST_FILTER
 from ibvs_qp.estimation.attitude import estimated_rate
 from ibvs_qp.estimation.inputs import Body, motor_thrust
+from ibvs_qp.model.motion_margin import LARGEST_SENSITIVITY, MotionLoop, motion_sensitivity
 
 TICK = 0.004
 #: Motors that rise and fall alike, so that the vehicle is linear.

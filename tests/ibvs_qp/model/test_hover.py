@@ -9,9 +9,9 @@ import pytest
 from controller_scenes import CEILING, FLOOR, attitude, measured
 
 from allocation import control_effectiveness
-from ibvs_qp.analysis.motion import TICKS_LATE, MotionLoop
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.model.hover import hold_thrusts, hover_gains
+from ibvs_qp.model.motion_margin import TICKS_LATE, MotionLoop
 
 CONFIG = ControllerConfig()
 MATRIX = control_effectiveness(CONFIG.vehicle.geometry)

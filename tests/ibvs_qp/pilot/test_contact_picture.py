@@ -7,9 +7,9 @@ import dataclasses
 import pytest
 
 from ibvs_qp.config import ControllerConfig, VehicleParams
-from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.contact_picture import contact_picture, hint_span
+from ibvs_qp.pilot.painting.config import PaintingConfig
 from ibvs_qp.pilot.vehicle_check import check_vehicle
 
 #: 70 degrees upright.

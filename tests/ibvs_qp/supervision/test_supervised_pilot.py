@@ -14,9 +14,9 @@ from sensed_vehicle import SensedVehicle
 
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.measurement import SensorFrame
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
-from ibvs_qp.painting.painter import Painter
 from ibvs_qp.pilot import FlightStatus, Pilot, PilotConfig
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.painting.painter import Painter
 
 #: Ticks before a fault: noise of the sensors has been seen.
 QUIET = 70

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
 
 HUGE = "5000000000000000000000"

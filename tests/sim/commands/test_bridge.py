@@ -18,10 +18,10 @@ from dds_loopback import environment, require_dds
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
-import ibvs_qp.ros.write_bag as write_bag_module
+import ibvs_qp.interfaces.ros.write_bag as write_bag_module
 from ibvs_qp import RgbdFrame, SensorFrame
-from ibvs_qp.ros.messages import typestore
-from ibvs_qp.ros.write_bag import write_bag
+from ibvs_qp.interfaces.ros.messages import typestore
+from ibvs_qp.interfaces.ros.write_bag import write_bag
 from ibvs_qp.vision.picture.lens import Lens
 from sim.commands.cli import main
 from sim.detection.truth import FAMILIES, render_frame, sample_scene

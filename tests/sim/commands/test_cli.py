@@ -19,7 +19,7 @@ from made_up_flights import fake_fly
 import ibvs_qp
 import sim.flight.side_by_side
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.presets import FILES
+from ibvs_qp.pilot.presets import FILES
 from sim.commands.cli import main
 from sim.commands.options import preset_file
 from sim.flight.flight_log import load_run

@@ -8,7 +8,7 @@ import pytest
 from synthetic_trace import Errors, synthetic_trace
 
 import sim.sweep.flying
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
 
 PAIR = [str(FOLDER / "tarot_t960_qp.toml"), str(FOLDER / "tarot_t960_paper.toml")]

@@ -1,4 +1,4 @@
-"""``ibvs-qp export-c``: the printed command, with the library itself left out (tests/ibvs_qp/export has it)."""
+"""``ibvs-qp export-c``: the printed command, without the library itself (tests/ibvs_qp/interfaces/c_library)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from sim.commands.cli import main
 def test_the_printed_command_is_one_that_a_shell_takes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in ("ibvs_qp.export.library.write_library", "ibvs_qp.export.recorded.write_recorded"):
+    for name in (
+        "ibvs_qp.interfaces.c_library.library.write_library",
+        "ibvs_qp.interfaces.c_library.recorded.write_recorded",
+    ):
         monkeypatch.setattr(name, lambda *_: None)
     monkeypatch.setattr("sim.bench.ticks.press_ticks", lambda *_: [])
     folder = tmp_path / "my lib's; controller"

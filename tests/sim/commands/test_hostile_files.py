@@ -20,7 +20,7 @@ import sim.storage.parquet
 import sim.sweep.flying
 import sim.sweep.tables
 from ibvs_qp.config.files import UnreadableFile
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
 from sim.flight.flight_log import load_run, save_log
 
@@ -99,7 +99,7 @@ def test_special_files(tmp_path: Path, refuses: Callable[..., str], command: str
 
 @pytest.mark.parametrize("name", BYTES)
 def test_mcap(refuses: Callable[..., str], name: str) -> None:
-    """More of them: tests/ibvs_qp/recording/test_reader.py."""
+    """More of them: tests/ibvs_qp/interfaces/log/test_reader.py."""
     Path("x.mcap").write_bytes(BYTES[name])
     assert "x.mcap: it is no MCAP file" in refuses("replay x.mcap")
 

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from recorded_flights import record
 
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
 from sim.flight.flight_log import load_run
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ibvs_qp.painting.pattern import COLUMNS, CORNERS, PATTERNS
+from ibvs_qp.pilot.painting.pattern import COLUMNS, CORNERS, PATTERNS
 from sim.experiments.scenes import short_job
 from sim.experiments.whole_walls import __main__ as command
 from sim.experiments.whole_walls import flights

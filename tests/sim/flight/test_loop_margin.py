@@ -11,7 +11,8 @@ import pytest
 from closed_loop_rigs import HoldPainter, run, short_scene, wall
 
 import ibvs_qp
-from ibvs_qp.analysis.contact import (
+from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_margin import (
     LEAST_DAMPING_RATIO,
     STIFFNESS_RATIOS,
     BrushSettings,
@@ -21,12 +22,11 @@ from ibvs_qp.analysis.contact import (
     least_margin,
     require_margin,
 )
-from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.model import reach
-from ibvs_qp.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.pilot import Pilot, PilotConfig
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
+from ibvs_qp.pilot.presets import FOLDER
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.surroundings import World
 from sim.world.scene import ForceTorqueScene, ImuScene, Scene

@@ -15,13 +15,13 @@ from rotor_layouts import OCTOROTOR
 
 import ibvs_qp
 from allocation import TAROT_T960, Rotor, RotorGeometry
-from ibvs_qp.analysis.contact import BrushSettings
 from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config.contact_margin import BrushSettings
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.painting.config import PaintingConfig
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.presets import FOLDER
+from ibvs_qp.pilot.painting.config import PaintingConfig
+from ibvs_qp.pilot.presets import FOLDER
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import ibvs_qp
-from ibvs_qp.presets import FILES
+from ibvs_qp.pilot.presets import FILES
 from sim.commands.cli import main
 from sim.report.conditions import differing_presets, differing_runs
 

@@ -14,8 +14,8 @@ from recorded_flights import flown
 
 from ibvs_qp import SensorFrame
 from ibvs_qp.frames import rotate, rotation_from_quaternion
-from ibvs_qp.recording import Recorder, read_log, replay
-from ibvs_qp.recording.messages import decode, encode
+from ibvs_qp.interfaces.log import Recorder, read_log, replay
+from ibvs_qp.interfaces.log.messages import decode, encode
 from ibvs_qp.validation.sensor_frame import SensorGate
 from sim.experiments.scenes import changed, short_job
 from sim.faults.rotors import Derate
@@ -115,9 +115,9 @@ def test_a_flight_with_a_barometer_replays_to_the_bit(tmp_path: Path) -> None:
 
 def test_a_bag_keeps_the_rate(tmp_path: Path) -> None:
     pytest.importorskip("rosbags", reason="needs the extra ros")
-    from ibvs_qp.ros.bag import Bag
-    from ibvs_qp.ros.topics import Topics
-    from ibvs_qp.ros.write_bag import write_bag
+    from ibvs_qp.interfaces.ros.bag import Bag
+    from ibvs_qp.interfaces.ros.topics import Topics
+    from ibvs_qp.interfaces.ros.write_bag import write_bag
 
     topics = Topics(height_rate="/climb")
     frames = [

@@ -12,7 +12,7 @@ import pytest
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, rotation_from_quaternion
 from ibvs_qp.measurement import FeatureFrame, LineFeature
-from ibvs_qp.painting.pattern import CORNERS, PATTERNS
+from ibvs_qp.pilot.painting.pattern import CORNERS, PATTERNS
 from sim.sensors.features import BOARD_TRACKS, GeometricFeatures, add_sigma_vs
 from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas

@@ -23,7 +23,7 @@ from rendered_scenes import (
     stroke_row,
 )
 
-from ibvs_qp.painting.pattern import COLUMNS, CORNERS, Pattern
+from ibvs_qp.pilot.painting.pattern import COLUMNS, CORNERS, Pattern
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
 from sim.world.scene import BoardScene, PaintScene, Scene
 

@@ -1,1 +1,0 @@
-"""Between this controller and other systems: parameters of autopilots, motor commands."""

@@ -1,0 +1,119 @@
+"""From single messages to sensor frames: the last received samples are held; a picture is given once."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ibvs_qp.interfaces.ros import pictures, samples
+from ibvs_qp.interfaces.ros.messages import BadMessage, from_ros
+from ibvs_qp.interfaces.ros.topics import MOTION, Topics
+from ibvs_qp.measurement import RgbdFrame, SensorFrame, channels
+from ibvs_qp.validation.clock import LEAD_NS
+
+#: Colour and depth pictures that wait for their partner; they arrive within a frame of each other.
+WAITING = 4
+#: A stamp of the system's clock lies at most this far behind it [ns].
+LATEST_NS = 1_000_000_000
+
+
+class LatestSamples:
+    """Collects messages in the order of their arrival.
+
+    A frame has the last received sample of every sensor with its own stamp, for any order of the stamps: the
+    pilot checks their age. Colour and depth are paired by the nearest stamps within ``pair_s``. A message that cannot
+    be used is left out and counted.
+
+    Attributes:
+        last: Last sample of each role.
+        ignored: Messages left out, by role and reason.
+        camera: Of the last camera info, None before it.
+        pairs: Complete pictures so far.
+
+    Args:
+        topics: Axes of the force sensor, source of the attitude, and tolerance of the pairs.
+        clock: Time that stamps are compared with [ns]; None compares nothing, as for a recording.
+    """
+
+    def __init__(self, topics: Topics, clock: Callable[[], int] | None = None) -> None:
+        self._topics, self._clock = topics, clock
+        self.last: dict[str, samples.Sample] = {}
+        self.ignored = Counter[str]()
+        self.camera: pictures.Camera | None = None
+        self.pairs = 0
+        self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque(maxlen=WAITING) for name in ("color", "depth")}
+        self._picture: RgbdFrame | None = None
+
+    @np.errstate(all="ignore")  # a host may have numpy raise for the NaN of a message
+    def add(self, role: str, value: Any) -> bool:
+        """Take a decoded message of a role of `ibvs_qp.interfaces.ros.topics.ACCEPTED`; False if it cannot be used."""
+        try:
+            if role in self._waiting:
+                self._add_picture(role, value)
+            elif role == "camera_info":
+                self.camera = pictures.to_camera(value)
+            else:
+                self._add_sample(role, value)
+        except BadMessage as error:
+            self.ignore(role, str(error))
+            return False
+        except Exception:  # a bag may define a type of this name without the fields
+            self.ignore(role, "fields are not those of its type")
+            return False
+        return True
+
+    def ignore(self, role: str, reason: str) -> None:
+        """Count a message that is left out."""
+        self.ignored[f"{role}: {reason}"] += 1
+
+    def frame(self, stamp_ns: int) -> SensorFrame | None:
+        """Frame of a tick, with a picture that no frame had; None until every sensor was received."""
+        if any(role not in self.last for role in MOTION):
+            return None
+        values: dict[str, Any] = {}
+        for sample in self.last.values():
+            values |= sample.values | {channels(SensorFrame)[name].stamp: sample.stamp_ns for name in sample.values}
+        return SensorFrame(stamp_ns=stamp_ns, image=self.take_picture(), **values)
+
+    def take_picture(self) -> RgbdFrame | None:
+        """The last complete picture, once."""
+        picture, self._picture = self._picture, None
+        return picture
+
+    def check_clock(self, stamp_ns: int) -> None:
+        """Raise BadMessage for a stamp that is not of the clock, or too old."""
+        if self._clock is not None and not -LEAD_NS <= self._clock() - stamp_ns <= LATEST_NS:
+            raise BadMessage("stamp is not of this computer's clock, or too old")
+
+    def _add_sample(self, role: str, value: Any) -> None:
+        sample = samples.READERS[role](value, self._topics)
+        if role == "imu" and not self._topics.attitude:
+            self.check_clock(sample.stamp_ns)
+            self.last["attitude"] = samples.attitude(value)
+        self.check_clock(sample.stamp_ns)
+        self.last[role] = sample
+
+    def _add_picture(self, role: str, value: Any) -> None:
+        """Keep a picture, and complete the pair of the nearest stamps."""
+        pixels = pictures.to_rgb(value) if role == "color" else pictures.to_depth(value)
+        stamp = from_ros(value.header.stamp)
+        self.check_clock(stamp)
+        own, other = self._waiting[role], self._waiting["depth" if role == "color" else "color"]
+        nearest = min(other, key=lambda each: abs(each[0] - stamp), default=None)
+        if nearest is None or abs(nearest[0] - stamp) > round(self._topics.pair_s * 1e9):
+            own.append((stamp, pixels))
+            return
+        own.clear()
+        other.clear()
+        (color_ns, rgb), (_, depth) = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
+        if (camera := self.camera) is None:
+            raise BadMessage("no camera info yet")
+        if self._topics.depth_registered and rgb.shape[:2] != depth.shape:
+            raise BadMessage("colour and depth differ in size")
+        if rgb.shape[:2] != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
+            raise BadMessage("size is not that of camera_info")
+        self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=color_ns)
+        self.pairs += 1

@@ -1,0 +1,122 @@
+"""``sensor_msgs/Image`` and ``CameraInfo`` to pictures and intrinsics, and back; BadMessage for unusable ones."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, IMAGE, BadMessage, header, message
+from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
+
+#: Channels of the colour encodings, in the order red, green, blue.
+_RGB, _BGR = (0, 1, 2), (2, 1, 0)
+_COLOURS = {"rgb8": (3, _RGB), "bgr8": (3, _BGR), "rgba8": (4, _RGB), "bgra8": (4, _BGR), "mono8": (1, (0, 0, 0))}
+#: Numbers of the depth encodings, and their unit [m] (REP 118).
+_DEPTHS = {"16UC1": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
+#: Longest side of a picture [px].
+LONGEST_SIDE = 4096
+#: Lens models of ROS with OpenCV's coefficients.
+LENS_MODELS = ("plumb_bob", "rational_polynomial")
+#: Largest difference of the coefficients of one lens [-].
+LENS_ERROR = 1e-6
+_FRAME = "camera_color_optical_frame"
+
+
+class Camera(NamedTuple):
+    """Camera of the raw pictures."""
+
+    intrinsics: tuple[float, float, float, float]  # (fx, fy, cx, cy) [px]
+    shape: tuple[int, int]  # height and width [px]
+    distortion: tuple[float, ...]  # coefficients of the lens in OpenCV's order
+
+    def has_lens(self, distortion: tuple[float, ...]) -> bool:
+        """Whether the lens has these coefficients; missing ones are 0."""
+        pairs = itertools.zip_longest(self.distortion, distortion, fillvalue=0.0)
+        return all(abs(one - other) <= LENS_ERROR for one, other in pairs)
+
+
+def to_rgb(image: Any) -> np.ndarray:
+    """Colour, uint8 (H, W, 3)."""
+    if image.encoding not in _COLOURS:
+        raise BadMessage("encoding is no colour of 8 bits")
+    channels, order = _COLOURS[image.encoding]
+    pixels = _rows(image, channels).reshape(image.height, image.width, channels)
+    return np.ascontiguousarray(pixels[..., order])
+
+
+def to_depth(image: Any) -> np.ndarray:
+    """Depth [m], float32 (H, W), 0 where invalid."""
+    if image.encoding not in _DEPTHS:
+        raise BadMessage("encoding is not 16UC1 or 32FC1")
+    kind, unit = _DEPTHS[image.encoding]
+    number = np.dtype(kind).newbyteorder(">" if image.is_bigendian else "<")
+    metres = _rows(image, number.itemsize).view(number).astype(np.float32)
+    if unit != 1.0:
+        metres *= np.float32(unit)
+    return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
+
+
+def to_camera(info: Any) -> Camera:
+    """Camera of a ``sensor_msgs/CameraInfo`` with a camera matrix and a lens model of OpenCV."""
+    k = np.asarray(info.k, float)
+    if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
+        raise BadMessage("no camera matrix")
+    if info.distortion_model not in (LENS_MODELS if np.any(info.d) else (*LENS_MODELS, "")):  # simulators name none
+        raise BadMessage("distortion_model is not plumb_bob or rational_polynomial")
+    if len(info.d) not in DISTORTION_SIZES or not np.isfinite(info.d).all():
+        raise BadMessage(f"d has not {', '.join(map(str, DISTORTION_SIZES))} finite coefficients")
+    intrinsics = float(k[0]), float(k[4]), float(k[2]), float(k[5])
+    return Camera(intrinsics, (int(info.height), int(info.width)), tuple(map(float, info.d)))
+
+
+def from_rgb(rgb: np.ndarray, stamp_ns: int) -> Any:
+    """``sensor_msgs/Image`` in rgb8."""
+    return _image(np.ascontiguousarray(rgb, np.uint8), "rgb8", stamp_ns)
+
+
+def from_depth(depth: np.ndarray, stamp_ns: int) -> Any:
+    """``sensor_msgs/Image`` in 32FC1: depth [m] without rounding."""
+    return _image(np.ascontiguousarray(depth, np.float32), "32FC1", stamp_ns)
+
+
+def from_intrinsics(intrinsics: tuple[float, ...], shape: tuple[int, ...], stamp_ns: int) -> Any:
+    """``sensor_msgs/CameraInfo`` of (fx, fy, cx, cy) [px] and a picture's shape, without distortion."""
+    fx, fy, cx, cy = intrinsics
+    k = np.array((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))
+    return message(
+        CAMERA_INFO,
+        header=header(stamp_ns, _FRAME),
+        height=shape[0],
+        width=shape[1],
+        distortion_model="plumb_bob",
+        d=np.zeros(5),
+        k=k,
+        r=np.eye(3).ravel(),
+        p=np.insert(k, (3, 6, 9), 0.0),
+    )
+
+
+def _rows(image: Any, pixel_bytes: int) -> np.ndarray:
+    """Bytes of the pixels, (H, W pixel_bytes), without the padding of the rows."""
+    height, width, step = int(image.height), int(image.width), int(image.step)
+    if not (1 <= height <= LONGEST_SIDE and 1 <= width <= LONGEST_SIDE):
+        raise BadMessage("size out of range")
+    if step < width * pixel_bytes or len(image.data) != height * step:
+        raise BadMessage("size does not fit the data")
+    return np.ascontiguousarray(np.asarray(image.data).reshape(height, step)[:, : width * pixel_bytes])
+
+
+def _image(pixels: np.ndarray, encoding: str, stamp_ns: int) -> Any:
+    return message(
+        IMAGE,
+        header=header(stamp_ns, _FRAME),
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        is_bigendian=int(sys.byteorder == "big"),
+        step=pixels.strides[0],
+        data=pixels.reshape(-1).view(np.uint8),
+    )
