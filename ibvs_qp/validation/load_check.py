@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ibvs_qp.config.safety import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
@@ -158,6 +157,8 @@ def _arm(vehicle: VehicleParams) -> np.ndarray:
 
 def _turn(loads: list[_Load]) -> str:
     """The turn that explains the readings best (Wahba's problem), in words."""
+    from scipy.spatial.transform import Rotation  # 0.25 s, and only a refusal needs it
+
     expected = np.array([load.expected / load.size for load in loads])
     read = np.array([load.read / load.length for load in loads])
     weights = [(load.size / load.error) ** 2 for load in loads]

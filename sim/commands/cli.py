@@ -99,6 +99,10 @@ def _run(words: list[str]) -> int:
         return _user_error(f"{error.filename or 'the disk or the output'}: {error.strerror}")
     except MemoryError:
         return _user_error("not enough memory")
+    except ModuleNotFoundError as error:
+        if error.name != "polars":
+            return _internal_error()
+        return _user_error(f"{words[0]} needs the extra studies: pip install -c constraints.txt -e '.[studies]'")
     except KeyboardInterrupt:
         print("ibvs-qp: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED

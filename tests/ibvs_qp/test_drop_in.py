@@ -101,6 +101,11 @@ def test_importing_the_controller_loads_numpy_and_casadi_alone() -> None:
     assert not any(name.startswith("ibvs_qp.vision") for name in parts)
 
 
+def test_supervision_and_estimation_load_no_scipy_either() -> None:
+    code = "import sys, ibvs_qp.estimation.estimator\nfrom ibvs_qp import Assured\nprint(*sys.modules)"
+    assert not {name.split(".")[0] for name in loaded(code)} & {"scipy", "osqp", "qpsolvers", "cv2"}
+
+
 def test_a_command_line_check_loads_no_solver() -> None:
     modules = loaded("import sys, ibvs_qp, allocation, ibvs_qp.vision\nprint(' '.join(sorted(sys.modules)))")
     assert not modules & {"casadi", "osqp", "scipy", "cv2"}

@@ -220,6 +220,49 @@ def test_internal_error_keeps_its_traceback(flown, capsys, monkeypatch):
     assert "ZeroDivisionError: seven" in capsys.readouterr().err
 
 
+#: Runs the command line where the packages of studies are not installed.
+WITHOUT_STUDIES = """
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("polars", "optuna", "dask", "distributed"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
+
+sys.meta_path.insert(0, Missing())
+from sim.commands.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize(
+    "words", ["experiment gust --plan", "sweep x.toml", "compare a b", "faults --plan", "tune --trials 1"]
+)
+def test_a_study_without_its_packages_names_the_extra(tmp_path: Path, words: str) -> None:
+    (tmp_path / "x.toml").write_text("")
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_STUDIES, *words.split()],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 2 and done.stdout == ""
+    name = words.split()[0]
+    assert done.stderr == (
+        f"ibvs-qp: error: {name} needs the extra studies: pip install -c constraints.txt -e '.[studies]'\n"
+    )
+
+
+def test_paint_needs_no_package_of_the_studies(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text("[paint]\nrows = 1\nstroke_m = 0.2\n")
+    words = "paint --scene short.toml --features geometric --no-video --out run".split()
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_STUDIES, *words], capture_output=True, text=True, timeout=300, cwd=tmp_path
+    )
+    assert done.returncode == 0 and (tmp_path / "run" / "report.html").exists(), done.stderr
+
+
 def test_help_shows_an_example_and_imports_nothing_heavy():
     code = (
         "import sys; from sim.commands.cli import main; code = main(['paint', '--help']);"
