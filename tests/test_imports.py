@@ -26,11 +26,10 @@ ORDER = {
 #: Parts of a folder in the order of their imports. Those of vision are its stages: data passes forward.
 PARTS = {
     "vision": (
-        "compilation medians config checks picture appearance surface flow lines perception_result overlay paper "
-        "perception"
+        "compilation medians config checks picture appearance surface flow lines perception_result paper perception"
     ).split(),
     "pilot": "painting config pilot presets".split(),
-    "interfaces": "c_library log ros px4".split(),
+    "interfaces": "overlay c_library log ros px4".split(),
 }
 #: Most folders of the controller: more than a newcomer keeps in mind are too many.
 MOST_ROOMS = 12

@@ -10,10 +10,10 @@ import numpy as np
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.controller import HybridController
+from ibvs_qp.interfaces.overlay import draw_overlay
 from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.pilot.painting.strategy import PHASES
-from ibvs_qp.vision.overlay import draw_overlay
 from sim.flight.assemble import NUMBERS, OUTCOMES, Flown, LoggedRows, assemble, logged_signals
 from sim.flight.columns import Columns
 from sim.flight.journal import CHUNK_S, Header, Journal

@@ -12,8 +12,8 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from ibvs_qp.interfaces.log.scene import CAMERA, DEPTH_CAMERA, Message, rgba
 from ibvs_qp.interfaces.log.writer import LogWriter, timestamp
+from ibvs_qp.interfaces.overlay import draw_overlay
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.overlay import draw_overlay
 from ibvs_qp.vision.perception_result import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
 

@@ -9,9 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.interfaces.overlay import draw_overlay
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.overlay import draw_overlay
 from ibvs_qp.vision.perception import Perception
 from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import phase_window

@@ -14,9 +14,9 @@ import pytest
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import align_line
+from ibvs_qp.interfaces.overlay import draw_overlay
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
-from ibvs_qp.vision.overlay import draw_overlay
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.perception import PaperPerception
 
