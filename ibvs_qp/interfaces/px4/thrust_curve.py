@@ -54,7 +54,8 @@ class ThrustCurve(Checked):
         if factor < LEAST_FACTOR:
             return ratio
         linear = 1.0 - factor
-        return (np.sqrt(linear * linear + 4.0 * factor * ratio) - linear) / (2.0 * factor)
+        root = np.sqrt(linear * linear + 4.0 * factor * ratio)
+        return np.minimum((root - linear) / (2.0 * factor), 1.0)  # rounding: 1 + 1e-11 for a small factor
 
     def thrusts(self, commands: np.ndarray, voltage: float | None = None) -> np.ndarray:
         """Thrusts of normalised commands [N].

@@ -21,10 +21,9 @@ from sim.experiments.scenes import changed, short_job
 from sim.faults.rotors import Derate
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
-from sim.flight.trace import CRASH, LANDED, Trace
+from sim.flight.trace import LANDED, Trace
 from sim.sensors.barometer import Barometer
 from sim.sensors.suite import SensorSuite
-from sim.world.crash import TOUCHDOWN_SINK_M_S
 from sim.world.errors import world_errors
 from sim.world.plant import Plant
 from sim.world.scene import BarometerScene, Scene
@@ -149,6 +148,6 @@ def last_second(trace: Trace) -> tuple[float, float]:
 
 def test_a_blind_descent_ends_more_gently_with_a_barometer() -> None:
     without, fitted = descent(), descent(fitted=True)
-    assert without.reason.startswith(CRASH) and fitted.reason == LANDED
+    assert fitted.reason == LANDED
     (hard, drift), (gentle, error) = last_second(without), last_second(fitted)
-    assert hard > TOUCHDOWN_SINK_M_S > gentle and error < 0.6 * drift, (hard, gentle, drift, error)
+    assert gentle < 0.8 * hard and error < 0.4 * drift, (hard, gentle, drift, error)
