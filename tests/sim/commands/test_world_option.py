@@ -22,7 +22,7 @@ from sim.world.errors import GyroErrors, WorldErrors, world_errors
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, OF_THE_SCENE, in_world, scene_in_world
 
-PRESET = str(Path(ibvs_qp.__file__).parent / "presets" / "tarot_t960_qp.toml")
+PRESET = str(Path(ibvs_qp.__file__).parent / "pilot" / "presets" / "tarot_t960_qp.toml")
 PAINT = ["paint", "--law", "qp", "--no-video", "--json", "--out", "run", "--overwrite"]
 
 

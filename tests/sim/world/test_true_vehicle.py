@@ -168,7 +168,7 @@ def test_a_raised_camera_sees_things_lower() -> None:
 
 
 def test_without_a_plant_section_the_believed_vehicle_flies() -> None:
-    octorotor = PilotConfig.from_toml(ROOT / "ibvs_qp" / "presets" / "octorotor_qp.toml").controller.vehicle
+    octorotor = PilotConfig.from_toml(ROOT / "ibvs_qp" / "pilot" / "presets" / "octorotor_qp.toml").controller.vehicle
     for believed in (BELIEVED, octorotor, dataclasses.replace(BELIEVED, mass_kg=7.0, tip_position_m=(0.8, 0.0, 0.1))):
         for seed in (0, 5):
             true = true_vehicle(Scene(), believed, seed)

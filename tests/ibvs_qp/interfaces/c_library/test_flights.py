@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.slow, needs_compiler]
 
 #: Ticks of a flight that may fly by the analytic law where the solver computes with floats.
 LEFT_OUT = 50
-RECORD = Path(__file__).parents[3] / "docs" / "experiments" / "all.parquet"
+RECORD = Path(__file__).parents[4] / "docs" / "experiments" / "all.parquet"
 NAMES = ("path_rms_straight_m", "force_rms_straight_n", "tilt_rms_deg")
 #: Flights with doubles, which give Python's thrusts, and with floats.
 SEEDS = {False: 2, True: 4}

@@ -18,7 +18,7 @@ from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.interfaces.log import Recorder, read_log, replay
 from ibvs_qp.interfaces.log.writer import LogWriter
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 #: Steps a controller at 250 Hz and prints the ticks so far.
 FLY = """
 import sys

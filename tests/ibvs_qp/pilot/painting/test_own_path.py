@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from painted_wall import END, NEAR, PaintedWall, short
 
-OWN_PATH = runpy.run_path(str(Path(__file__).parents[3] / "examples" / "own_path.py"))["OwnPath"]
+OWN_PATH = runpy.run_path(str(Path(__file__).parents[4] / "examples" / "own_path.py"))["OwnPath"]
 
 
 def flown(**changes: Any) -> tuple[PaintedWall, dict[int, np.ndarray]]:
