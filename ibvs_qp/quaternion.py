@@ -31,13 +31,6 @@ def conjugate(quaternion: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
     return w, -x, -y, -z
 
 
-def normalized(quaternion: Quaternion) -> Quaternion:
-    """A quaternion divided by its length."""
-    length = math.hypot(*quaternion)
-    w, x, y, z = quaternion
-    return w / length, x / length, y / length, z / length
-
-
 def from_rotation_vector(vector: Sequence[float] | np.ndarray) -> Quaternion:
     """Unit quaternion of a rotation vector (axis times angle [rad])."""
     half = 0.5 * np.asarray(vector, float)
@@ -67,9 +60,3 @@ def small_difference(first: Sequence[float], second: Sequence[float]) -> tuple[f
     w, x, y, z = multiply(conjugate(first), second)
     sign = math.copysign(2.0, w)  # q and -q are one attitude
     return sign * x, sign * y, sign * z
-
-
-def angle_between(first: Sequence[float], second: Sequence[float]) -> float:
-    """Angle between two attitudes [rad], for any signs of their quaternions."""
-    w, *vector = multiply(conjugate(first), second)
-    return 2.0 * math.atan2(math.hypot(*vector), abs(w))

@@ -27,7 +27,7 @@ from ibvs_qp.frames import (
     skew,
     to_camera,
 )
-from ibvs_qp.quaternion import angle_between, multiply, small_difference, small_turn, turned
+from ibvs_qp.quaternion import multiply, small_difference, small_turn, turned
 
 angles = st.floats(-1.4, 1.4)
 any_angle = st.floats(-20.0, 20.0)
@@ -143,7 +143,5 @@ def test_quaternions_turn_as_rotations_do(vector: tuple[float, ...], small: tupl
     q, both = first.as_quat(scalar_first=True), (first * step).as_quat(scalar_first=True)
     for found in (multiply(q, small_turn(small)), turned(q, small)):
         assert abs(np.dot(found, both)) == pytest.approx(1.0, abs=1e-9)
-        assert angle_between(found, both) == pytest.approx(0.0, abs=1e-5)
     for sign in (1.0, -1.0):  # q and -q are one attitude
         np.testing.assert_allclose(small_difference(q, sign * both), small, atol=1e-5)
-        assert angle_between(q, sign * both) == pytest.approx(np.linalg.norm(small), abs=1e-6)
