@@ -65,7 +65,7 @@ class Structures:
             lines=target * config.line_slots,
         )
         self.command = _structure(
-            "ibvs_command",
+            "ibvs_command_result",
             stamp_ns=stamp,
             thrusts=real * rotors,
             wrench=real * 6,

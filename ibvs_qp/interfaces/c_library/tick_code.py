@@ -12,7 +12,7 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.tick import tick_signals
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.symbolic.logic import both, where
-from ibvs_qp.symbolic.signals import Signals, stack
+from ibvs_qp.symbolic.signals import Signals, places, stack
 from ibvs_qp.tasks.line import line_state
 
 NAME = "ibvs_tick"
@@ -25,10 +25,10 @@ OUTPUTS = (
     "thrust_lower",
     "thrust_upper",
     "reach",
-    "estimate.known",
-    "estimate.in_contact",
-    "estimate.push",
-    "estimate.distance",
+    "contact.known",
+    "contact.touching",
+    "contact.push",
+    "contact.distance",
 )
 #: Numbers with a point or an exponent, which C takes for doubles.
 _DOUBLE = re.compile(r"(?<![\w.])((?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])")
@@ -58,8 +58,11 @@ class TickCode:
         values = setting_values(problem.model.config).items()
         constants = {name: value for name, value in values if not name.startswith("gains.")}
         extra = [*problem.values, *analytic_terms(problem.model)]
-        self.signals, (_, *results) = tick_signals(problem.model, extra, constants)
-        self.signals.outputs = {name: self.signals.outputs[name] for name in OUTPUTS}
+        self.signals, (point, *results) = tick_signals(problem.model, extra, constants)
+        available = self.signals.outputs | {
+            name: point[place] for name, place in places(problem.model.signals.inputs).items()
+        }
+        self.signals.outputs = {name: available[name] for name in OUTPUTS}
         _drop_states(self.signals, [*self.signals.outputs.values(), *results])
         states = ca.densify(self.signals.next_states)
         outputs = [states, ca.sum1(states), stack(self.signals.outputs), *map(ca.densify, results)]

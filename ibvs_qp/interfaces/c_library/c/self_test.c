@@ -24,7 +24,7 @@ static uint32_t below(uint32_t end) { /* xorshift */
 
 /* Largest difference of the thrusts [N]; the second instance is reset half way and must not matter. */
 static double replay(void) {
-  ibvs_command command, second;
+  ibvs_command_result command, second;
   double largest = 0;
   ibvs_init(&one);
   ibvs_init(&other);
@@ -95,7 +95,7 @@ static void break_reference(ibvs_reference *r) {
 }
 
 /* Whether the thrusts are finite, within their limits and within the rate limit. */
-static bool sound(const ibvs_command *command, const ibvs_real *before) {
+static bool sound(const ibvs_command_result *command, const ibvs_real *before) {
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
     const ibvs_real thrust = command->thrusts[i];
     if (!(thrust >= ibvs_thrust_floor[i] && thrust <= ibvs_thrust_ceiling[i])) {
@@ -109,7 +109,7 @@ static bool sound(const ibvs_command *command, const ibvs_real *before) {
 }
 
 static uint32_t fly_broken(uint32_t count) {
-  ibvs_command command;
+  ibvs_command_result command;
   ibvs_real before[IBVS_ROTORS];
   uint32_t unsound = 0;
   bool commanded = false;

@@ -17,7 +17,7 @@
 void fault(void);
 extern uint32_t stack_top;
 static ibvs_controller controller;
-static ibvs_command command;
+static ibvs_command_result command;
 
 static void semihost(uint32_t operation, const void *argument) {
   register uint32_t r0 __asm("r0") = operation;
