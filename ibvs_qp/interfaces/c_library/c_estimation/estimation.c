@@ -235,8 +235,8 @@ static void report(ibvs_flight *f) {
   memcpy(now->wrench, &predicted[IBVS_PREDICTED_WRENCH], sizeof now->wrench);
   memcpy(now->velocity, &motion[IBVS_MOTION_VELOCITY], sizeof now->velocity);
   memcpy(now->odometer, &motion[IBVS_MOTION_ODOMETER], sizeof now->odometer);
-  memcpy(now->attitude, &f->predict_states[IBVS_ROW_ATTITUDE], sizeof now->attitude);
-  memcpy(now->rate_in_body, &f->predict_states[IBVS_ROW_RATE], sizeof now->rate_in_body);
+  memcpy(now->attitude, &f->predict_states[IBVS_STATE_ATTITUDE], sizeof now->attitude);
+  memcpy(now->rate_in_body, &f->predict_states[IBVS_STATE_RATE], sizeof now->rate_in_body);
 }
 
 void ibvs_estimate(ibvs_flight *f, const ibvs_frame *frame, const ibvs_features *features,

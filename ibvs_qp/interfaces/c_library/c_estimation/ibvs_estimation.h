@@ -101,7 +101,7 @@ typedef struct {
 
 /* Ticks of the last half second. */
 typedef struct {
-  ibvs_real rows[IBVS_HISTORY][IBVS_ROW];
+  ibvs_real rows[IBVS_HISTORY][IBVS_MOTION_STATES + 4]; /* motion and attitude */
   int64_t stamps[IBVS_HISTORY];
   ibvs_real lengths[IBVS_HISTORY]; /* [s] */
   uint32_t first, count;

@@ -10,14 +10,15 @@ const ibvs_real *ibvs_motion(const ibvs_flight *f) {
   return f->history.rows[index_of(&f->history, f->history.count - 1)];
 }
 
-static void add(ibvs_tick_history *h, int64_t stamp_ns, const ibvs_real *row, ibvs_real dt) {
+static void add(ibvs_tick_history *h, int64_t stamp_ns, const ibvs_real *states, ibvs_real dt) {
   if (h->count == IBVS_HISTORY) {
     h->first = index_of(h, 1);
   } else {
     h->count += 1;
   }
   const uint32_t index = index_of(h, h->count - 1);
-  memcpy(h->rows[index], row, sizeof h->rows[index]);
+  memcpy(h->rows[index], states, IBVS_MOTION_STATES * sizeof *states);
+  memcpy(&h->rows[index][IBVS_MOTION_STATES], &states[IBVS_STATE_ATTITUDE], 4 * sizeof *states);
   h->stamps[index] = stamp_ns;
   h->lengths[index] = dt;
 }
@@ -67,7 +68,7 @@ static void set_entries(ibvs_tick_history *h, uint32_t entry, const ibvs_real va
 
 void ibvs_attitude_at(const ibvs_flight *f, int64_t stamp_ns, ibvs_real attitude[4]) {
   const ibvs_tick_history *h = &f->history;
-  memcpy(attitude, &h->rows[index_of(h, nearest(h, stamp_ns))][IBVS_ROW_ATTITUDE], 4 * sizeof *attitude);
+  memcpy(attitude, &h->rows[index_of(h, nearest(h, stamp_ns))][IBVS_MOTION_STATES], 4 * sizeof *attitude);
 }
 
 void ibvs_motion_reset(ibvs_flight *f) {
