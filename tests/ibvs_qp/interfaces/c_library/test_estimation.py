@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from c_flight import CFlight, PilotTick, flown, recorded_flight
-from c_library import flight, needs_compiler
+from c_library import flight_instance, needs_compiler
 from recorded_inputs import recording
 
 from ibvs_qp.command import Outcome
@@ -58,7 +58,7 @@ def differences(own: CFlight, ticks: Sequence[PilotTick]) -> dict[str, float]:
 
 def test_a_recorded_flight_gives_the_estimates_and_thrusts_of_python() -> None:
     ticks = recorded_flight(CASE)
-    largest = differences(flight(CASES[CASE].config()), ticks)
+    largest = differences(flight_instance(CASES[CASE].config()), ticks)
     assert largest.pop("thrusts") <= THRUST_N
     for name in ("normal", "distance", "rate", "push", "stiffness", "attitude", "rate_in_body", "wrench"):
         assert largest[name] == 0.0, name
@@ -117,7 +117,7 @@ def test_gaps_jumps_and_false_features_have_the_estimates_of_python() -> None:
         if tick % 89 == 0:
             frame = dataclasses.replace(frame, wrench_stamp_ns=frame.stamp_ns + 10**9)
         frames.append(moved(frame, 5_000_000_000) if tick >= 1500 else frame)
-    largest = differences(flight(CASES[CASE].config()), flown(CASES[CASE].pilot(), frames))
+    largest = differences(flight_instance(CASES[CASE].config()), flown(CASES[CASE].pilot(), frames))
     assert largest.pop("thrusts") <= THRUST_N and max(largest.values()) <= ESTIMATE, largest
 
 
@@ -133,13 +133,13 @@ def test_a_surface_before_the_observed_one_has_the_estimates_of_python() -> None
     pilot = CASES[CASE].pilot()
     ticks = flown(pilot, frames)
     assert pilot.contact.surface_offset > 0.5 * BEHIND_M
-    largest = differences(flight(CASES[CASE].config()), ticks)
+    largest = differences(flight_instance(CASES[CASE].config()), ticks)
     assert largest.pop("thrusts") <= THRUST_N and max(largest.values()) <= ESTIMATE, largest
 
 
 def test_failing_inertial_sensors_hold_and_are_named() -> None:
     config, ticks = CASES[CASE].config(), recorded_flight(CASE)[:1200]
-    own, step = flight(config), config.controller.vehicle.thrust_rate_n_s * config.controller.tick_s
+    own, step = flight_instance(config), config.controller.vehicle.thrust_rate_n_s * config.controller.tick_s
     for place, (tick, followed, *_) in enumerate(ticks):
         fails = 1000 <= place < 1010
         rate = np.full(3, math.nan) if fails else tick.frame.angular_velocity
@@ -156,7 +156,7 @@ def test_failing_inertial_sensors_hold_and_are_named() -> None:
 
 def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
     config, ticks = CASES[CASE].config(), recorded_flight(CASE)
-    own, vehicle = flight(config), config.controller.vehicle
+    own, vehicle = flight_instance(config), config.controller.vehicle
     tip = np.subtract(vehicle.tip_position_m, vehicle.camera_position_m)
     place = next(place for place, tick in enumerate(ticks) if tick.followed)
     for tick, followed, *_ in ticks[: place + 1]:
@@ -178,7 +178,7 @@ def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
 @pytest.mark.parametrize("case", ["heavy_noise", "octorotor"])
 def test_further_flights_give_the_estimates_of_python(case: str) -> None:
     """Redundant thrusts of eight rotors have a weight of 0.01 only."""
-    largest = differences(flight(CASES[case].config()), recorded_flight(case))
+    largest = differences(flight_instance(CASES[case].config()), recorded_flight(case))
     assert largest.pop("thrusts") <= (1e-3 if case == "octorotor" else THRUST_N)
     assert max(largest.values()) <= ESTIMATE, largest
 
@@ -186,6 +186,6 @@ def test_further_flights_give_the_estimates_of_python(case: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [CASE, "heavy_noise"])
 def test_flights_in_single_precision_give_the_estimates_of_python(case: str) -> None:
-    largest = differences(flight(CASES[case].config(), single=True), recorded_flight(case))
+    largest = differences(flight_instance(CASES[case].config(), single=True), recorded_flight(case))
     assert largest.pop("thrusts") <= SINGLE_THRUST_N and largest.pop("stiffness") <= SINGLE_STIFFNESS
     assert max(largest.values()) <= SINGLE, largest
