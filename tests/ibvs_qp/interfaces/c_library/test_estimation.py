@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,7 +40,7 @@ BEHIND_M = 0.03
 
 def differences(own: CFlight, ticks: Sequence[PilotTick]) -> dict[str, float]:
     """Largest difference of every number; flags, lines and modes are equal."""
-    largest: dict[str, float] = {}
+    rows: dict[str, list[tuple[Any, Any]]] = defaultdict(list)
     for place, (tick, followed, python, command) in enumerate(ticks):
         own.estimate(tick.frame)
         other, found = own.act(tick.reference, followed), own.estimated()
@@ -47,12 +48,16 @@ def differences(own: CFlight, ticks: Sequence[PilotTick]) -> dict[str, float]:
         assert list(found.lines) == list(python.lines), place
         assert other.mode == MODES.index(command.mode), place
         assert other.outcome in SOLVED or (other.outcome == HOLD and command.outcome is Outcome.HOLD), place
-        pairs = {name: (value, python.numbers[name]) for name, value in found.numbers.items()}
+        rows["thrusts"].append((np.array(other.thrusts), command.thrusts))
+        for name, value in found.numbers.items():
+            rows[name].append((value, python.numbers[name]))
         for track, line in found.lines.items():
-            pairs |= {f"line {track} {name}": (value, python.lines[track][name]) for name, value in line.items()}
-        for name, (value, expected) in (pairs | {"thrusts": (np.array(other.thrusts), command.thrusts)}).items():
-            np.testing.assert_array_equal(np.isnan(value), np.isnan(expected), f"{place} {name}")
-            largest[name] = max(largest.get(name, 0.0), float(np.nanmax(np.abs(value - expected), initial=0.0)))
+            rows["lines"].append((list(line.values()), list(python.lines[track].values())))
+    largest = {}
+    for name, pairs in rows.items():
+        values, expected = (np.array(side) for side in zip(*pairs, strict=True))
+        assert (np.isnan(values) == np.isnan(expected)).all(), name
+        largest[name] = float(np.nanmax(np.abs(values - expected)))
     return largest
 
 
