@@ -17,7 +17,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_motion import SLOTS
 from ibvs_qp.interfaces.c_library.recorded import FlightTick
-from ibvs_qp.measurement import VERTICAL, FeatureFrame, Reference, SensorFrame
+from ibvs_qp.measurement import VERTICAL, FeatureFrame, Measurement, Reference, SensorFrame
 from ibvs_qp.pilot import Pilot
 from tests.replay.cases import CASES
 
@@ -64,20 +64,23 @@ def recorded_flight(case: str) -> list[PilotTick]:
     return flown(CASES[case].pilot(), recording(case).frames)
 
 
-def flown(pilot: Pilot, frames: Sequence[SensorFrame]) -> list[PilotTick]:
-    """Frames through a pilot."""
-    ticks = []
-    for frame in frames:
+def flown(pilot: Pilot, frames: Sequence[SensorFrame], derated: int = -1, most_n: float = 0.0) -> list[PilotTick]:
+    """Frames through a pilot; from a tick on, every rotor gives so much at most [N]."""
+    ticks, rotors = [], pilot.config.controller.vehicle.geometry.count
+    for place, frame in enumerate(frames):
+        if place == derated:
+            pilot.thrust_limits = np.zeros(rotors), np.full(rotors, most_n)
+        asked = pilot.setpoints.push_reference
         command = pilot.step(frame)
         assert pilot.measurement is not None
         followed = tuple(line.track_id for line in pilot.measurement.lines)
         tick = FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts)
-        ticks.append(PilotTick(tick, followed, estimated(pilot), command))
+        ticks.append(PilotTick(tick, followed, estimated(pilot, asked), command))
     return ticks
 
 
-def estimated(pilot: Pilot) -> Estimated:
-    """Estimates of the last tick."""
+def estimated(pilot: Pilot, push_reference: float) -> Estimated:
+    """Estimates of the last tick; ``push_reference`` is that before it [N]."""
     contact, motion, estimator = pilot.contact.state, pilot.motion, pilot.estimator
     numbers = {
         "normal": contact.normal,
@@ -85,12 +88,13 @@ def estimated(pilot: Pilot) -> Estimated:
         "rate": contact.rate,
         "push": contact.push,
         "push_noise": contact.push_noise,
+        "push_reference": push_reference,
         "time_in_contact": contact.time_since_touch,
         "stiffness": contact.stiffness,
         "velocity": motion.state[:2],
         "odometer": motion.state[4:6],
         "attitude": estimator.attitude,
-        "rate_in_body": estimator.rate,
+        "angular_velocity": estimator.rate,
         "wrench": estimator.wrench,
     }
     return Estimated(
@@ -158,7 +162,7 @@ class CFlight:
         tracked |= dict.fromkeys(("fresh_weight", "seen_angle", "middle", "length"), real)
         stamps = {"slot": whole, "frames": whole, "seen_ns": stamp, "fresh_ns": stamp}
         flags = ("valid", "wall_known", "in_contact", "stiffness_known", "tared", "velocity_known")
-        scalars = ("distance", "rate", "push", "push_noise", "time_in_contact", "stiffness")
+        scalars = ("distance", "rate", "push", "push_noise", "push_reference", "time_in_contact", "stiffness")
         self.estimates = structure(
             "ibvs_estimates",
             stamp_ns=stamp,
@@ -169,7 +173,7 @@ class CFlight:
             velocity=real * 2,
             odometer=real * 2,
             attitude=real * 4,
-            rate_in_body=real * 3,
+            angular_velocity=real * 3,
             wrench=real * 6,
             line_count=whole,
             lines=structure("ibvs_tracked_line", **line, **stamps, **tracked) * SLOTS,
@@ -183,9 +187,13 @@ class CFlight:
         """As after construction."""
         self._library.ibvs_flight_reset(self._instance)
 
-    def estimate(self, frame: SensorFrame) -> Any:
-        """Estimates of one tick."""
+    def estimate(self, frame: SensorFrame, measurement: Measurement | None = None) -> Any:
+        """Estimates of one tick; with the thrust limits of a measurement."""
         own, features = self._frame(), frame.features
+        for name in ("thrust_min", "thrust_max"):
+            if measurement is not None and (limits := getattr(measurement, name)) is not None:
+                setattr(own, f"has_{name}", True)
+                getattr(own, name)[:] = limits.tolist()
         for name in ("attitude", "angular_velocity", "specific_force", "wrench"):
             getattr(own, name)[:] = getattr(frame, name).tolist()
         own.stamp_ns, own.wrench_stamp_ns = frame.stamp_ns, frame.wrench_stamp_ns
@@ -229,9 +237,20 @@ class CFlight:
     def estimated(self) -> Estimated:
         """Estimates of the last tick."""
         own = self.estimates
-        names = ("normal", "distance", "rate", "push", "push_noise", "time_in_contact", "stiffness", "velocity")
+        names = (
+            "normal",
+            "distance",
+            "rate",
+            "push",
+            "push_noise",
+            "push_reference",
+            "time_in_contact",
+            "stiffness",
+            "velocity",
+        )
         numbers = {
-            name: np.array(getattr(own, name)) for name in (*names, "odometer", "attitude", "rate_in_body", "wrench")
+            name: np.array(getattr(own, name))
+            for name in (*names, "odometer", "attitude", "angular_velocity", "wrench")
         }
         if not own.wall_known:
             numbers["distance"] = np.zeros(())

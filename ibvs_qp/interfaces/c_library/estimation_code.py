@@ -42,8 +42,8 @@ from ibvs_qp.validation.fields import SENSOR_FRAME, FieldTable
 
 #: The shell: code that is independent of the configuration.
 SHELL = Path(__file__).parent / "c_estimation"
-#: Outputs of the law that the prediction takes at the next tick.
-FROM_LAW = ("motors_force",)
+#: Outputs of the law for the next tick: of the prediction, and of the strategy.
+FROM_LAW = ("motors_force", "push_reference")
 #: Largest difference of the two halves of a covariance, relative: rounding.
 ASYMMETRY = 1e-5
 

@@ -81,7 +81,7 @@ def write_flight(folder: Path, config: ControllerConfig, ticks: Sequence[FlightT
                 f"static const ibvs_features features_{place} = {_features(tick.frame.features, config, single)};"
             )
         followed = [line.track_id for line in tick.measurement.lines[: config.line_slots]]
-        frame, reference = _frame(tick.frame, single), _reference(tick.reference, config.line_slots, single)
+        frame, reference = _frame(tick, single), _reference(tick.reference, config.line_slots, single)
         members = {"frame": frame, "features": features, "reference": reference, "thrusts": tick.thrusts.tolist()}
         rows.append(_structure(single, **members, followed=followed, count=len(followed)))
     code += [
@@ -96,9 +96,11 @@ def write_flight(folder: Path, config: ControllerConfig, ticks: Sequence[FlightT
     (folder / "ibvs_recorded_flight.h").write_text(_FLIGHT_HEADER.format(count=len(ticks), tolerance=tolerance))
 
 
-def _frame(frame: SensorFrame, single: bool) -> str:
+def _frame(tick: FlightTick, single: bool) -> str:
     names = ("stamp_ns", "attitude", "angular_velocity", "specific_force", "wrench", "wrench_stamp_ns")
-    return _structure(single, **{name: getattr(frame, name) for name in names})
+    limits = {name: getattr(tick.measurement, name) for name in ("thrust_min", "thrust_max")}
+    known = {f"has_{name}": value is not None for name, value in limits.items()}
+    return _structure(single, **{name: getattr(tick.frame, name) for name in names}, **known, **limits)
 
 
 def _features(features: FeatureFrame, config: ControllerConfig, single: bool) -> str:

@@ -229,6 +229,7 @@ static void report(ibvs_flight *f) {
   now->rate = predicted[IBVS_PREDICTED_RATE];
   now->push = predicted[IBVS_PREDICTED_PUSH];
   now->push_noise = predicted[IBVS_PREDICTED_PUSH_NOISE];
+  now->push_reference = f->controller.results[IBVS_OUT_PUSH_REFERENCE];
   now->time_in_contact = predicted[IBVS_PREDICTED_TIME_SINCE_TOUCH];
   now->stiffness = predicted[IBVS_PREDICTED_STIFFNESS];
   memcpy(now->normal, &predicted[IBVS_PREDICTED_NORMAL], sizeof now->normal);
@@ -236,7 +237,7 @@ static void report(ibvs_flight *f) {
   memcpy(now->velocity, &motion[IBVS_MOTION_VELOCITY], sizeof now->velocity);
   memcpy(now->odometer, &motion[IBVS_MOTION_ODOMETER], sizeof now->odometer);
   memcpy(now->attitude, &f->predict_states[IBVS_STATE_ATTITUDE], sizeof now->attitude);
-  memcpy(now->rate_in_body, &f->predict_states[IBVS_STATE_RATE], sizeof now->rate_in_body);
+  memcpy(now->angular_velocity, &f->predict_states[IBVS_STATE_RATE], sizeof now->angular_velocity);
 }
 
 void ibvs_estimate(ibvs_flight *f, const ibvs_frame *frame, const ibvs_features *features,
@@ -324,7 +325,7 @@ static void measure(const ibvs_flight *f, ibvs_measurement *m) {
   const ibvs_real *right = &f->predicted[IBVS_PREDICTED_AXIS_RIGHT], *down = &f->predicted[IBVS_PREDICTED_AXIS_DOWN];
   m->stamp_ns = frame->stamp_ns;
   memcpy(m->attitude, now->attitude, sizeof m->attitude);
-  memcpy(m->angular_velocity, now->rate_in_body, sizeof m->angular_velocity);
+  memcpy(m->angular_velocity, now->angular_velocity, sizeof m->angular_velocity);
   m->has_specific_force = true;
   memcpy(m->specific_force, frame->specific_force, sizeof m->specific_force);
   memcpy(m->contact_wrench, now->wrench, sizeof m->contact_wrench);

@@ -98,9 +98,9 @@ static uint32_t fly_broken(uint32_t count) {
     }
     ibvs_estimate(&one, &frame, recorded->features == NULL ? NULL : &features, &estimates);
     ibvs_command(&one, &reference, followed, recorded->count, &command);
-    unsound += sound(&command, tick > 0 ? before : NULL) ? 0 : 1;
-    unsound += ibvs_finite(estimates.normal, 3) && ibvs_finite(estimates.velocity, 2) && ibvs_finite(estimates.odometer, 2)
-                   ? 0 : 1;
+    const bool finite = ibvs_finite(estimates.normal, 3) && ibvs_finite(estimates.velocity, 2) &&
+                        ibvs_finite(estimates.odometer, 2) && ibvs_finite(estimates.wrench, 6);
+    unsound += finite && sound(&command, tick > 0 ? before : NULL) ? 0 : 1;
     memcpy(before, command.thrusts, sizeof before);
   }
   return unsound;

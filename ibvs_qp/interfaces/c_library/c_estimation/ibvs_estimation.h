@@ -41,7 +41,7 @@ typedef struct {
   ibvs_real segment[4]; /* visible end points x1, y1, x2, y2 */
 } ibvs_line_feature;
 
-/* Features of one picture at its capture. */
+/* Features of one picture at its capture; a plane alone is one without lines. */
 typedef struct {
   int64_t stamp_ns;
   bool has_plane;
@@ -88,12 +88,13 @@ typedef struct {
   ibvs_real rate;            /* of the distance [m/s] */
   ibvs_real push;            /* filtered, on the wall [N]; push_noise: its deviation in free flight */
   ibvs_real push_noise;
+  ibvs_real push_reference;  /* of the law in the tick before, within reach [N] */
   ibvs_real time_in_contact; /* [s], 0 while free */
   ibvs_real stiffness;       /* of brush and wall [N/m]; the assumed one until it is known */
   ibvs_real velocity[2];     /* in the wall plane, right and down [m/s] */
   ibvs_real odometer[2];     /* way of the tip [m] */
   ibvs_real attitude[4];     /* without steps that the gyro did not measure */
-  ibvs_real rate_in_body[3]; /* angular velocity without the gyro's bias [rad/s] */
+  ibvs_real angular_velocity[3]; /* without the gyro's bias [rad/s] */
   ibvs_real wrench[6];       /* tared contact wrench ON the vehicle at the centre of mass, in B [N, N m] */
   uint32_t line_count;
   ibvs_tracked_line lines[IBVS_TRACKS]; /* in the order in which they were found */
