@@ -11,6 +11,7 @@ import json
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,10 @@ import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.interfaces.c_library.library import write_library
-from ibvs_qp.interfaces.c_library.recorded import write_recorded
+from ibvs_qp.interfaces.c_library.recorded import FlightTick, write_flight, write_recorded
 from ibvs_qp.measurement import Measurement, Reference
-from sim.bench.ticks import recorded_ticks
+from ibvs_qp.pilot import PilotConfig
+from sim.bench.ticks import press_flight, recorded_ticks
 
 #: What the cross build and QEMU need.
 TOOLS = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm", "make"
@@ -66,12 +68,23 @@ def missing_tools() -> list[str]:
 def replay(config: ControllerConfig, ticks: list[tuple[Measurement, Reference]], single: bool) -> Replay:
     """Cross build a library and replay ticks: a Cortex-M4F for floats, a Cortex-M7 for doubles."""
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        write_library(folder, config, single)
-        write_recorded(folder, config, ticks, single)
-        sizes = _make(folder, "all").stdout.splitlines()[-1].split()
-        said = _make(folder, "replay").stderr.splitlines()
-        linked = (folder / "cortex_m" / "build" / "example_bare_metal.map").read_text()
+        write_library(Path(scratch), config, single)
+        write_recorded(Path(scratch), config, ticks, single)
+        return _replay(Path(scratch))
+
+
+def replay_flight(config: PilotConfig, ticks: Sequence[FlightTick], single: bool) -> Replay:
+    """The same with estimation."""
+    with tempfile.TemporaryDirectory() as scratch:
+        write_library(Path(scratch), config.controller, single, config.estimation)
+        write_flight(Path(scratch), config.controller, ticks, single)
+        return _replay(Path(scratch))
+
+
+def _replay(folder: Path) -> Replay:
+    sizes = _make(folder, "all").stdout.splitlines()[-1].split()
+    said = _make(folder, "replay").stderr.splitlines()
+    (linked,) = (folder / "cortex_m" / "build").glob("example_*.map")
     rows = np.array([line.split() for line in said if line[:1].isdigit()], float).reshape(-1, 5)
     (stack,) = (int(line.split()[1]) for line in said if line.startswith("stack"))
     iterations, limited, instructions, outcome, nano = rows.T
@@ -85,7 +98,7 @@ def replay(config: ControllerConfig, ticks: list[tuple[Measurement, Reference]],
         stack=stack,
         flash=text + data,
         ram=data + bss,
-        allocates="malloc" in linked,
+        allocates="malloc" in linked.read_text(),
     )
 
 
@@ -127,7 +140,12 @@ def main() -> None:
         parser.error(f"not on this machine: {', '.join(missing)}")
     ticks = recorded_ticks(parser.parse_args().ticks, 0)
     targets = {"cortex_m4f_float": True, "cortex_m7_double": False}
-    print(json.dumps({name: figures(replay(ControllerConfig(), ticks, single)) for name, single in targets.items()}))
+    flight = press_flight(PilotConfig(), len(ticks))
+    found = {name: figures(replay(ControllerConfig(), ticks, single)) for name, single in targets.items()}
+    found |= {
+        f"{name}_estimation": figures(replay_flight(PilotConfig(), flight, single)) for name, single in targets.items()
+    }
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from allocation import TAROT_T960
 from ibvs_qp.controller import HybridController
+from ibvs_qp.interfaces.c_library.recorded import FlightTick
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.pilot import PilotConfig
 from sim.faults.fault import Fault
@@ -92,13 +93,15 @@ def flown_ticks(scene: Scene, seed: int, job: Job, faults: tuple[Fault, ...], re
             yield pilot.measurement, pilot.reference
 
 
-def press_ticks(config: PilotConfig, count: int) -> list[Tick]:
-    """Ticks of a press at a wall nearby, with a configuration's vehicle and law."""
+def press_flight(config: PilotConfig, count: int) -> list[FlightTick]:
+    """A press at a wall nearby, with a configuration's vehicle and law, and so many ticks at most."""
     scene, options = Scene(), FlightOptions(features="geometric", video=False)
     pilot, world = make_pilot(scene, options, config, PressJob(hold_s=PRESS_S)), World(scene, options, config)
-    ticks: list[Tick] = []
+    ticks: list[FlightTick] = []
     while len(ticks) < count and not (pilot.painter.finished or world.plant.over):
-        world.act(pilot.step(world.sense()).thrusts)
+        frame = world.sense()
+        command = pilot.step(frame)
+        world.act(command.thrusts)
         if pilot.measurement is not None:
-            ticks.append((pilot.measurement, pilot.reference))
+            ticks.append(FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts))
     return ticks

@@ -28,6 +28,8 @@ class ExportC:
     """Preset (TOML) or the name of a shipped one; vehicle, limits and weights are compiled in."""
     float: Annotated[bool, flag] = False
     """Single precision, for a microcontroller without a double-precision unit."""
+    estimation: Annotated[bool, flag] = False
+    """Estimation as well: sensors and features of pictures in, estimates and thrusts out."""
 
     def run(self, words: list[str]) -> int:
         """Write the library."""
@@ -35,9 +37,9 @@ class ExportC:
 
         from ibvs_qp.config.errors import ConfigError
         from ibvs_qp.interfaces.c_library.library import write_library
-        from ibvs_qp.interfaces.c_library.recorded import write_recorded
+        from ibvs_qp.interfaces.c_library.recorded import write_flight, write_recorded
         from ibvs_qp.pilot import PilotConfig
-        from sim.bench.ticks import press_ticks
+        from sim.bench.ticks import press_flight
         from sim.flight.working import working
 
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
@@ -47,8 +49,12 @@ class ExportC:
         if settings.law != "qp":
             raise ConfigError(f"law: {settings.law!r}; the library has only the quadratic program: 'qp'")
         with working(Console(stderr=True), "Writing the library ..."):
-            write_library(self.folder, settings.controller, self.float)
-            write_recorded(self.folder, settings.controller, press_ticks(settings, RECORDED_TICKS), self.float)
+            controller, flight = settings.controller, press_flight(settings, RECORDED_TICKS)
+            write_library(self.folder, controller, self.float, settings.estimation if self.estimation else None)
+            ticks = [(tick.measurement, tick.reference) for tick in flight]
+            write_recorded(self.folder, controller, ticks, self.float)
+            if self.estimation:
+                write_flight(self.folder, controller, flight, self.float)
         print(f"Written: {self.folder}")
         print(f"Build and test it: {shlex.join(['make', '-C', str(self.folder), 'test'])}")
         return 0

@@ -18,16 +18,18 @@ class Structures:
     """Types of ``ibvs_qp.h`` for one configuration and precision.
 
     Attributes:
-        measurement, reference, command: The structures.
+        real: Type of a number.
+        measurement, reference, line_reference, command: The structures.
     """
 
     def __init__(self, config: ControllerConfig, rows: int, single: bool) -> None:
-        real, rotors = ctypes.c_float if single else ctypes.c_double, config.vehicle.geometry.count
+        self.real = real = ctypes.c_float if single else ctypes.c_double
+        rotors = config.vehicle.geometry.count
         flag, stamp, count = ctypes.c_bool, ctypes.c_int64, ctypes.c_uint32
-        line = _structure("ibvs_line", rho=real, theta=real, weight=real, variance=real, stamp_ns=stamp, role=count)
-        target = _structure("ibvs_line_reference", rho=real, theta=real, role=count)
-        self.gains = _structure("ibvs_gains", **{field.name: real for field in fields(Gains)})
-        self.measurement = _structure(
+        line = structure("ibvs_line", rho=real, theta=real, weight=real, variance=real, stamp_ns=stamp, role=count)
+        self.line_reference = target = structure("ibvs_line_reference", rho=real, theta=real, role=count)
+        self.gains = structure("ibvs_gains", **{field.name: real for field in fields(Gains)})
+        self.measurement = structure(
             "ibvs_measurement",
             stamp_ns=stamp,
             attitude=real * 4,
@@ -52,7 +54,7 @@ class Structures:
             line_count=count,
             lines=line * (LINES_PER_SLOT * config.line_slots),
         )
-        self.reference = _structure(
+        self.reference = structure(
             "ibvs_reference",
             push_force=real,
             standoff=real,
@@ -64,8 +66,8 @@ class Structures:
             line_count=count,
             lines=target * config.line_slots,
         )
-        self.command = _structure(
-            "ibvs_command",
+        self.command = structure(
+            "ibvs_command_result",
             stamp_ns=stamp,
             thrusts=real * rotors,
             wrench=real * 6,
@@ -120,7 +122,8 @@ class Structures:
         return own
 
 
-def _structure(name: str, **members: Any) -> Any:
+def structure(name: str, **members: Any) -> Any:
+    """Type of a structure with these members."""
     return type(name, (ctypes.Structure,), {"_fields_": list(members.items())})
 
 

@@ -10,12 +10,14 @@ from pathlib import Path
 
 import pytest
 from c_binding import CController
+from c_flight import CFlight, recorded_flight
 from recorded_inputs import recording
 
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, EstimationConfig
 from ibvs_qp.controller import HybridController, qp_problem
 from ibvs_qp.interfaces.c_library.library import write_library
-from ibvs_qp.interfaces.c_library.recorded import write_recorded
+from ibvs_qp.interfaces.c_library.recorded import write_flight, write_recorded
+from ibvs_qp.pilot import PilotConfig
 
 #: Compiles in a third of the time of -O2.
 FLAGS = "CFLAGS=-O1 -Werror"
@@ -27,20 +29,24 @@ _folders = tempfile.TemporaryDirectory(prefix="ibvs_qp_c")
 
 
 @functools.cache
-def written(config: ControllerConfig, single: bool, flight: str = "") -> Path:
-    """Folder with the library's sources; with the recorded flight of its self-test where one is given."""
+def written(
+    config: ControllerConfig, single: bool, flight: str = "", estimation: EstimationConfig | None = None
+) -> Path:
+    """Folder with the library's sources; with the recorded flight of its tests where one is given."""
     folder = Path(tempfile.mkdtemp(dir=_folders.name))
-    write_library(folder, config, single)
+    write_library(folder, config, single, estimation)
     if flight:
         ticks = recording(flight)
         write_recorded(folder, config, list(zip(ticks.measurements, ticks.references, strict=True)), single)
+        if estimation is not None:
+            write_flight(folder, config, [flown.tick for flown in recorded_flight(flight)], single)
     return folder
 
 
 @functools.cache
-def built(config: ControllerConfig, single: bool = False) -> Path:
+def built(config: ControllerConfig, single: bool = False, estimation: EstimationConfig | None = None) -> Path:
     """Shared library; warnings are errors."""
-    folder = written(config, single)
+    folder = written(config, single, "", estimation)
     make(folder, "build/libibvs_qp.so", FLAGS)
     return folder / "build" / "libibvs_qp.so"
 
@@ -55,6 +61,13 @@ def make(folder: Path, *words: str) -> str:
 def instance(config: ControllerConfig, single: bool = False) -> CController:
     """A new instance of the library."""
     return CController(built(config, single), config, len(qp_problem(config).row_names), single)
+
+
+def flight_instance(config: PilotConfig, single: bool = False) -> CFlight:
+    """A new flight of the library with estimation."""
+    controller = config.controller
+    library = built(controller, single, config.estimation)
+    return CFlight(library, controller, len(qp_problem(controller).row_names), single)
 
 
 def pair(config: ControllerConfig, single: bool = False) -> tuple[HybridController, CController]:

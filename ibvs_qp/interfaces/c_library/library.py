@@ -6,9 +6,10 @@ import dataclasses
 import shutil
 from pathlib import Path
 
-from ibvs_qp.config import ControllerConfig
+from ibvs_qp.config import ControllerConfig, EstimationConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import qp_problem
+from ibvs_qp.interfaces.c_library.estimation_code import FROM_LAW, write_estimation
 from ibvs_qp.interfaces.c_library.tables import write_layout, write_tables
 from ibvs_qp.interfaces.c_library.tick_code import TickCode
 from ibvs_qp.qp.program_code import write_program
@@ -24,13 +25,17 @@ SINGLE_TOLERANCE, SINGLE_RELATIVE_TOLERANCE = 2e-3, 2e-6
 SINGLE_ITERATIONS = 20
 
 
-def write_library(folder: Path, config: ControllerConfig, single: bool = False) -> None:
+def write_library(
+    folder: Path, config: ControllerConfig, single: bool = False, estimation: EstimationConfig | None = None
+) -> None:
     """Write the C library of a configuration.
 
     Args:
         folder: Empty or new folder.
         config: Vehicle, limits and weights are compiled in; the gains may be changed at run time.
         single: All numbers are floats, for a microcontroller without a double-precision unit.
+        estimation: Noise models and life times of the estimation (``ibvs_estimate`` and ``ibvs_command``); None writes
+            the controller alone.
 
     Raises:
         ConfigError: When the configuration has something that the library has not.
@@ -46,12 +51,14 @@ def write_library(folder: Path, config: ControllerConfig, single: bool = False) 
         config = dataclasses.replace(config, solver=solver)
     folder.mkdir(parents=True, exist_ok=True)
     problem = qp_problem(config)
-    tick = TickCode(problem)
+    tick = TickCode(problem, () if estimation is None else FROM_LAW)
     tick.write(folder, single)
     write_layout(folder, problem, tick, single)
     write_tables(folder, problem, tick, single)
     write_program(folder, problem, config.solver, single)
     shutil.copytree(SHELL, folder, dirs_exist_ok=True)
+    if estimation is not None:
+        write_estimation(folder, config, estimation, tick, single)
 
 
 def _check(config: ControllerConfig, single: bool) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.measurement import VERTICAL, Measurement, Reference
+from ibvs_qp.measurement import VERTICAL, FeatureFrame, Measurement, Reference, SensorFrame
 from ibvs_qp.qp.program_code import real, reals
 from ibvs_qp.validation.fields import REFERENCE, field_table
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
@@ -18,6 +18,19 @@ from ibvs_qp.validation.measurement import LINES_PER_SLOT
 #: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
 #: of a tick on to the next ones.
 TOLERANCE, SINGLE_TOLERANCE_N = 5e-6, 0.03
+#: The same with estimation [N]: rounding of the estimates is added.
+FLIGHT_TOLERANCE, SINGLE_FLIGHT_TOLERANCE_N = 5e-6, 0.05
+#: Kinds of edges as in ``ibvs_edge``.
+EDGES = {"board": "IBVS_BOARD_EDGE", "paint": "IBVS_PAINT_EDGE"}
+
+
+class FlightTick(NamedTuple):
+    """One tick of a pilot's flight."""
+
+    frame: SensorFrame
+    measurement: Measurement  # of the law
+    reference: Reference
+    thrusts: np.ndarray  # [N], (n,)
 
 
 def write_recorded(
@@ -46,6 +59,73 @@ def write_recorded(
     (folder / "ibvs_recorded_ticks.c").write_text("\n".join(code))
     tolerance = real(SINGLE_TOLERANCE_N if single else TOLERANCE, single)
     (folder / "ibvs_recorded_ticks.h").write_text(_HEADER.format(count=len(ticks), tolerance=tolerance))
+
+
+def write_flight(folder: Path, config: ControllerConfig, ticks: Sequence[FlightTick], single: bool) -> None:
+    """Write ``ibvs_recorded_flight.c`` and ``.h``: inputs of estimation and law from the start of a flight.
+
+    Args:
+        folder: Folder of a library with estimation.
+        config: Its configuration.
+        ticks: The flight.
+        single: Whether the library's numbers are floats.
+    """
+    code = ["/* Recorded flight, and the thrusts of the pilot in Python [N]; generated. */"]
+    code += ["#include <stddef.h>", "", '#include "ibvs_recorded_flight.h"', ""]
+    rows = []
+    for place, tick in enumerate(ticks):
+        features = "NULL"
+        if tick.frame.features is not None:
+            features = f"&features_{place}"
+            code.append(
+                f"static const ibvs_features features_{place} = {_features(tick.frame.features, config, single)};"
+            )
+        followed = [line.track_id for line in tick.measurement.lines[: config.line_slots]]
+        frame, reference = _frame(tick, single), _reference(tick.reference, config.line_slots, single)
+        members = {"frame": frame, "features": features, "reference": reference, "thrusts": tick.thrusts.tolist()}
+        rows.append(_structure(single, **members, followed=followed, count=len(followed)))
+    code += [
+        "",
+        "const ibvs_recorded_tick ibvs_recorded_flight[IBVS_RECORDED_FLIGHT_TICKS] = {",
+        ",\n".join(rows),
+        "};",
+        "",
+    ]
+    (folder / "ibvs_recorded_flight.c").write_text("\n".join(code))
+    tolerance = real(SINGLE_FLIGHT_TOLERANCE_N if single else FLIGHT_TOLERANCE, single)
+    (folder / "ibvs_recorded_flight.h").write_text(_FLIGHT_HEADER.format(count=len(ticks), tolerance=tolerance))
+
+
+def _frame(tick: FlightTick, single: bool) -> str:
+    names = ("stamp_ns", "attitude", "angular_velocity", "specific_force", "wrench", "wrench_stamp_ns")
+    limits = {name: getattr(tick.measurement, name) for name in ("thrust_min", "thrust_max")}
+    known = {f"has_{name}": value is not None for name, value in limits.items()}
+    return _structure(single, **{name: getattr(tick.frame, name) for name in names}, **known, **limits)
+
+
+def _features(features: FeatureFrame, config: ControllerConfig, single: bool) -> str:
+    members = {name: getattr(features, name) for name in ("plane", "velocity", "velocity_covariance")}
+    known = {f"has_{name}": members[name] is not None for name in ("plane", "velocity")}
+    if features.velocity_covariance is not None:
+        members["velocity_covariance"] = features.velocity_covariance.ravel()
+    lines = [
+        _structure(
+            single,
+            track_id=line.track_id,
+            role=line.role == VERTICAL,
+            kind=EDGES.get(line.kind),
+            surface_side=line.surface_side,
+            rho=line.rho,
+            theta=line.theta,
+            variance=line.covariance.item(0),
+            weight=line.weight,
+            has_segment=line.segment is not None,
+            segment=None if line.segment is None else line.segment.ravel(),
+        )
+        for line in features.lines[: LINES_PER_SLOT * config.line_slots]
+    ]
+    stamps = {"stamp_ns": features.stamp_ns, "velocity_stamp_ns": features.velocity_stamp_ns}
+    return _structure(single, **stamps, **members, **known, line_count=len(lines), lines=lines)
 
 
 def _measurement(measurement: Measurement, slots: int, single: bool) -> str:
@@ -109,6 +189,29 @@ _HEADER = """/* Recorded flight for self-test and benchmark; generated. */
 extern const ibvs_measurement ibvs_recorded_measurements[IBVS_RECORDED_TICKS];
 extern const ibvs_reference ibvs_recorded_references[IBVS_RECORDED_TICKS];
 extern const ibvs_real ibvs_recorded_thrusts[IBVS_RECORDED_TICKS][IBVS_ROTORS];
+
+#endif
+"""
+_FLIGHT_HEADER = """/* Recorded flight with estimation; generated. */
+#ifndef IBVS_RECORDED_FLIGHT_H
+#define IBVS_RECORDED_FLIGHT_H
+
+#include "ibvs_estimation.h"
+
+#define IBVS_RECORDED_FLIGHT_TICKS {count}
+/* Largest difference from the thrusts of Python [N]. */
+#define IBVS_RECORDED_FLIGHT_TOLERANCE {tolerance}
+
+typedef struct {{
+  ibvs_frame frame;
+  const ibvs_features *features; /* of a picture that came with it, or NULL */
+  ibvs_reference reference;
+  int64_t followed[IBVS_LINES];
+  uint32_t count;
+  ibvs_real thrusts[IBVS_ROTORS];
+}} ibvs_recorded_tick;
+
+extern const ibvs_recorded_tick ibvs_recorded_flight[IBVS_RECORDED_FLIGHT_TICKS];
 
 #endif
 """

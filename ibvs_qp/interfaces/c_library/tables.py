@@ -26,6 +26,8 @@ from ibvs_qp.validation.fields import REFERENCE, UNIT_TOLERANCE, FieldTable, fie
 from ibvs_qp.validation.measurement import LINES_PER_SLOT, OLDEST_LINE_NS
 
 GAINS = fields(Gains)
+#: Bits of rejected inputs, by kind of input or field, that are not the field's name.
+REJECTIONS = {"reference": "REFERENCE", "wrench": "CONTACT_WRENCH"}
 
 
 def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool) -> None:
@@ -80,8 +82,8 @@ def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "} ibvs_gains;",
         "",
         "/* Places of the inputs and results. */",
-        *_enumeration("IN", starts),
-        *_enumeration("OUT", places(tick.signals.outputs)),
+        *enumeration("IN", starts),
+        *enumeration("OUT", places(tick.signals.outputs)),
         "#endif",
         "",
     ]
@@ -93,7 +95,8 @@ def _explained(metadata: Mapping[str, Any]) -> str:
     return f"{metadata['doc']}{unit}, {metadata['low']:g} to {metadata['high']:g}"
 
 
-def _enumeration(prefix: str, starts: dict[str, slice]) -> list[str]:
+def enumeration(prefix: str, starts: Mapping[str, slice]) -> list[str]:
+    """Lines of an enumeration of first places, ``IBVS_PREFIX_NAME``."""
     entries = (f"  IBVS_{prefix}_{_capitals(name)} = {place.start}" for name, place in starts.items())
     return ["enum {", ",\n".join(entries), "};", ""]
 
@@ -130,8 +133,8 @@ def write_tables(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "/* Bounds of the inputs, start values and vehicle; generated. */",
         '#include "ibvs_internal.h"',
         "",
-        *_field_table("measurement", measurements, single),
-        *_field_table("reference", REFERENCE, single),
+        *field_rows("measurement", measurements, single),
+        *field_rows("reference", REFERENCE, single),
         f"const ibvs_measurement ibvs_first_measurement = {{{', '.join(before)}}};",
         f"const ibvs_reference ibvs_first_reference = {{{', '.join(asked)}}};",
         *(f"const ibvs_gains ibvs_{name}_gains = {{{reals(values, single)}}};" for name, values in gains.items()),
@@ -141,7 +144,7 @@ def write_tables(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
     (folder / "ibvs_tables.c").write_text("\n".join(lines))
 
 
-def _field_table(kind: str, fields: FieldTable, single: bool) -> list[str]:
+def field_rows(kind: str, fields: FieldTable, single: bool) -> list[str]:
     """The rows of `ibvs_qp.validation.fields` as those of ``ibvs_field``."""
     rows = []
     for field in fields.rows:
@@ -153,7 +156,7 @@ def _field_table(kind: str, fields: FieldTable, single: bool) -> list[str]:
             real(field.high, single),
             str(field.unit_length).lower(),
             str(field.held).lower(),
-            f"IBVS_REJECT_{'REFERENCE' if kind == 'reference' else _capitals(field.name)}",
+            f"IBVS_REJECT_{REJECTIONS.get(kind, REJECTIONS.get(field.name, _capitals(field.name)))}",
         )
         rows.append(f"  {{{', '.join(entries)}}},")
     return [f"const ibvs_field ibvs_{kind}_fields[] = {{", *rows, "};", ""]

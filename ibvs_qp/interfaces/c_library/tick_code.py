@@ -12,7 +12,7 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.tick import tick_signals
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.symbolic.logic import both, where
-from ibvs_qp.symbolic.signals import Signals, stack
+from ibvs_qp.symbolic.signals import Signals, places, stack
 from ibvs_qp.tasks.line import line_state
 
 NAME = "ibvs_tick"
@@ -25,15 +25,15 @@ OUTPUTS = (
     "thrust_lower",
     "thrust_upper",
     "reach",
-    "estimate.known",
-    "estimate.in_contact",
-    "estimate.push",
-    "estimate.distance",
+    "contact.known",
+    "contact.touching",
+    "contact.push",
+    "contact.distance",
 )
 #: Numbers with a point or an exponent, which C takes for doubles.
 _DOUBLE = re.compile(r"(?<![\w.])((?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])")
 #: CasADi calls these for doubles, even in single precision; the library's own names choose the precision.
-_FUNCTIONS = re.compile(r"\b(?:casadi_)?(sin|cos|tan|asin|acos|atan|atan2|exp|log|sqrt|fabs|fmin|fmax|floor)\(")
+_FUNCTIONS = re.compile(r"\b(?:casadi_)?(sin|cos|tan|asin|acos|atan|atan2|exp|log|pow|sqrt|fabs|fmin|fmax|floor)\(")
 #: Every argument and result is there; a number is no condition.
 _CHECKS = (
     (re.compile(r"\((a\d+)\?"), r"(\1!=0?"),
@@ -52,14 +52,21 @@ class TickCode:
     Attributes:
         signals: Inputs, states and outputs of the tick.
         function: (inputs, states) to next states, their sum, outputs, program, analytic terms.
+
+    Args:
+        problem: The program.
+        further: Further outputs of the law.
     """
 
-    def __init__(self, problem: QpProblem) -> None:
+    def __init__(self, problem: QpProblem, further: tuple[str, ...] = ()) -> None:
         values = setting_values(problem.model.config).items()
         constants = {name: value for name, value in values if not name.startswith("gains.")}
         extra = [*problem.values, *analytic_terms(problem.model)]
-        self.signals, (_, *results) = tick_signals(problem.model, extra, constants)
-        self.signals.outputs = {name: self.signals.outputs[name] for name in OUTPUTS}
+        self.signals, (point, *results) = tick_signals(problem.model, extra, constants)
+        available = self.signals.outputs | {
+            name: point[place] for name, place in places(problem.model.signals.inputs).items()
+        }
+        self.signals.outputs = {name: available[name] for name in (*OUTPUTS, *further)}
         _drop_states(self.signals, [*self.signals.outputs.values(), *results])
         states = ca.densify(self.signals.next_states)
         outputs = [states, ca.sum1(states), stack(self.signals.outputs), *map(ca.densify, results)]
@@ -67,19 +74,32 @@ class TickCode:
         self.function = ca.Function(NAME, inputs, ca.cse(outputs))
 
     def write(self, folder: Path, single: bool) -> None:
-        """Write ``ibvs_tick.c``: straight-line code, no branches on missing arguments, one precision."""
-        generator = ca.CodeGenerator(NAME, {"casadi_real": "ibvs_real", "casadi_int": "int"})
-        generator.add(self.function)
-        code = generator.dump()
-        begin = code.index("{", code.index("static int casadi_f0"))
-        body = code[begin : code.index("CASADI_SYMBOL_EXPORT", begin)].replace("  return 0;\n", "")
-        for pattern, replacement in _CHECKS:
-            body = pattern.sub(replacement, body)
-        body = _FUNCTIONS.sub(r"r_\1(", body).replace("casadi_sq(", "square(").replace("casadi_inf", "INFINITY")
-        body = body.replace("casadi_real", "ibvs_real")
-        if single:
-            body = _DOUBLE.sub(r"\1f", body)
-        (folder / f"{NAME}.c").write_text(_HEAD + body)
+        """Write ``ibvs_tick.c``."""
+        write_function(folder, NAME, self.function, "Sensors, reference and states to set-points and program", single)
+
+
+def write_function(folder: Path, name: str, function: ca.Function, content: str, single: bool) -> None:
+    """Write a function as C code: straight-line code, no branches on missing arguments, one precision.
+
+    Args:
+        folder: Receives ``<name>.c``.
+        name: Of the C function.
+        function: (inputs, states) to next states, their sum, and further results.
+        content: Inputs and results, for the comment at the head.
+        single: Numbers are floats.
+    """
+    generator = ca.CodeGenerator(name, {"casadi_real": "ibvs_real", "casadi_int": "int"})
+    generator.add(function)
+    code = generator.dump()
+    begin = code.index("{", code.index("static int casadi_f0"))
+    body = code[begin : code.index("CASADI_SYMBOL_EXPORT", begin)].replace("  return 0;\n", "")
+    for pattern, replacement in _CHECKS:
+        body = pattern.sub(replacement, body)
+    body = _FUNCTIONS.sub(r"r_\1(", body).replace("casadi_sq(", "square(").replace("casadi_inf", "INFINITY")
+    body = body.replace("casadi_real", "ibvs_real")
+    if single:
+        body = _DOUBLE.sub(r"\1f", body)
+    (folder / f"{name}.c").write_text(_HEAD.format(content=content, name=name) + body)
 
 
 def analytic_terms(model: Model) -> list[ca.SX]:
@@ -125,10 +145,10 @@ def _drop_states(signals: Signals, results: list[ca.SX]) -> None:
     signals.states = {name: state for name, state in signals.states.items() if name in needed}
 
 
-_HEAD = """/* One tick: sensors, reference and states to set-points, program and next states. Generated by CasADi
- * from the equations of the Python package ibvs_qp; straight-line code without loops or allocation. */
+_HEAD = """/* {content}, and next states. Generated by CasADi from the equations of
+ * the Python package ibvs_qp; straight-line code without loops or allocation. */
 #include "ibvs_internal.h"
 
-static ibvs_real square(ibvs_real x) { return x * x; }
+static ibvs_real square(ibvs_real x) {{ return x * x; }}
 
-void ibvs_tick(const ibvs_real *const *arg, ibvs_real *const *res) """
+void {name}(const ibvs_real *const *arg, ibvs_real *const *res) """

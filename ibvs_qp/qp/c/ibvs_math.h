@@ -30,6 +30,7 @@
 #define r_atan OF_REAL(atan)
 #define r_exp OF_REAL(exp)
 #define r_log OF_REAL(log)
+#define r_pow OF_REAL(pow)
 #define r_floor OF_REAL(floor)
 
 #if IBVS_FLOAT /* a third of the instructions of fmaxf, whose answer is a number where one argument is none */

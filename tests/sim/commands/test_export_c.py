@@ -18,7 +18,7 @@ def test_the_printed_command_is_one_that_a_shell_takes(
         "ibvs_qp.interfaces.c_library.recorded.write_recorded",
     ):
         monkeypatch.setattr(name, lambda *_: None)
-    monkeypatch.setattr("sim.bench.ticks.press_ticks", lambda *_: [])
+    monkeypatch.setattr("sim.bench.ticks.press_flight", lambda *_: [])
     folder = tmp_path / "my lib's; controller"
     assert main(["export-c", str(folder)]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "make" in line)

@@ -24,7 +24,7 @@ static int rising(const void *one, const void *other) {
 }
 
 int main(void) {
-  ibvs_command command;
+  ibvs_command_result command;
   uint32_t count = 0, iterations = 0;
   ibvs_init(&controller);
   for (uint32_t round = 0; round < ROUNDS; ++round) {

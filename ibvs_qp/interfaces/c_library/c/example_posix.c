@@ -19,7 +19,7 @@ static void read_sensors(int64_t now_ns, ibvs_measurement *m) {
   *m = (ibvs_measurement){.stamp_ns = now_ns, .attitude = {1, 0, 0, 0}, .wrench_stamp_ns = now_ns};
 }
 
-static void write_thrusts(const ibvs_command *command) {
+static void write_thrusts(const ibvs_command_result *command) {
   if (command->rejected != 0) {
     (void)fprintf(stderr, "rejected: 0x%x\n", (unsigned)command->rejected);
   }
@@ -28,7 +28,7 @@ static void write_thrusts(const ibvs_command *command) {
 int main(void) {
   const ibvs_reference reference = {.standoff = 1};
   ibvs_measurement measurement;
-  ibvs_command command;
+  ibvs_command_result command;
   struct timespec next;
   ibvs_init(&controller);
   (void)clock_gettime(CLOCK_MONOTONIC, &next);

@@ -15,7 +15,7 @@ typedef struct {
   ibvs_real low, high;
   bool unit_length;     /* the length must be 1 instead */
   bool held;            /* the last accepted value stays in force where one is refused */
-  uint32_t rejected;    /* bit of ibvs_command.rejected */
+  uint32_t rejected;    /* bit of ibvs_command_result.rejected */
 } ibvs_field;
 #define IBVS_NO_FLAG ((size_t)-1)
 
@@ -34,7 +34,12 @@ extern const ibvs_real ibvs_mass_matrix[6][6], ibvs_allocation_weights[6];
 void ibvs_tick(const ibvs_real *const *arguments, ibvs_real *const *results);
 
 /* validate.c */
-void ibvs_clock_reset(ibvs_controller *c);
+void ibvs_clock_reset(ibvs_clock *c);
+bool ibvs_accept_stamp(ibvs_clock *c, int64_t stamp);
+bool ibvs_sample_time(const ibvs_clock *c, int64_t stamp, int64_t *time_ns);
+bool ibvs_recent(const ibvs_clock *c, int64_t *stamp_ns);
+bool ibvs_good_plane(const ibvs_real plane[4]);
+bool ibvs_within(const void *structure, const ibvs_field *field);
 bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
                             uint32_t *rejected);
 bool ibvs_check_reference(ibvs_controller *c, const ibvs_reference *given);

@@ -14,7 +14,7 @@ void ibvs_reset(ibvs_controller *c) {
   memset(c, 0, sizeof *c);
   c->gains = gains;
   c->gains_in_force = in_force;
-  ibvs_clock_reset(c);
+  ibvs_clock_reset(&c->clock);
   c->last = ibvs_first_measurement;
   c->reference = ibvs_first_reference;
   c->tick_ns = -1;
@@ -61,7 +61,7 @@ static void wrench_of(const ibvs_real u[IBVS_ROTORS], ibvs_real wrench[6]) {
 
 /* Thrusts within the window, and their report. */
 static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real thrusts[IBVS_ROTORS], bool limited,
-                   ibvs_command *command) {
+                   ibvs_command_result *command) {
   ibvs_real beyond[IBVS_ROTORS];
   c->unallocated = 0;
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
@@ -79,7 +79,7 @@ static void finish(ibvs_controller *c, const ibvs_real *free, const ibvs_real th
 }
 
 /* Hover by the last inertial data within box and rate limit. */
-static void hover(ibvs_controller *c, const ibvs_real *lower, const ibvs_real *upper, ibvs_command *command) {
+static void hover(ibvs_controller *c, const ibvs_real *lower, const ibvs_real *upper, ibvs_command_result *command) {
   ibvs_real hold[IBVS_ROTORS], thrusts[IBVS_ROTORS];
   ibvs_hold_thrusts(c, hold);
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
@@ -91,7 +91,7 @@ static void hover(ibvs_controller *c, const ibvs_real *lower, const ibvs_real *u
 }
 
 /* Window of a tick without a measurement. */
-static void pause(ibvs_controller *c, ibvs_command *command) {
+static void pause(ibvs_controller *c, ibvs_command_result *command) {
   ibvs_real lower[IBVS_ROTORS], upper[IBVS_ROTORS];
   for (uint32_t i = 0; i < IBVS_ROTORS; ++i) {
     const ibvs_real floor = ibvs_thrust_floor[i], ceiling = ibvs_thrust_ceiling[i];
@@ -101,7 +101,7 @@ static void pause(ibvs_controller *c, ibvs_command *command) {
   hover(c, lower, upper, command);
 }
 
-static void fall_back(ibvs_controller *c, ibvs_command *command) {
+static void fall_back(ibvs_controller *c, ibvs_command_result *command) {
   const ibvs_real *lower = &c->results[IBVS_OUT_THRUST_LOWER], *upper = &c->results[IBVS_OUT_THRUST_UPPER];
   ibvs_real free[IBVS_ROTORS], thrusts[IBVS_ROTORS];
   if (!ibvs_finite(lower, IBVS_ROTORS) || !ibvs_finite(upper, IBVS_ROTORS)) {
@@ -119,15 +119,15 @@ static void fall_back(ibvs_controller *c, ibvs_command *command) {
   finish(c, free, thrusts, true, command);
 }
 
-void ibvs_step_packed(ibvs_controller *c, ibvs_command *command) {
+void ibvs_step_packed(ibvs_controller *c, ibvs_command_result *command) {
   ibvs_solution solution;
   evaluate(c);
-  const bool in_contact = c->results[IBVS_OUT_ESTIMATE_IN_CONTACT] != 0;
+  const bool in_contact = c->results[IBVS_OUT_CONTACT_TOUCHING] != 0;
   const bool press = c->inputs[IBVS_IN_REFERENCE_PRESS] != 0;
   command->mode = in_contact ? IBVS_MODE_CONTACT : (press ? IBVS_MODE_APPROACH : IBVS_MODE_FREE);
-  command->wall_known = c->results[IBVS_OUT_ESTIMATE_KNOWN] != 0;
-  command->distance = c->results[IBVS_OUT_ESTIMATE_DISTANCE];
-  command->push = c->results[IBVS_OUT_ESTIMATE_PUSH];
+  command->wall_known = c->results[IBVS_OUT_CONTACT_KNOWN] != 0;
+  command->distance = c->results[IBVS_OUT_CONTACT_DISTANCE];
+  command->push = c->results[IBVS_OUT_CONTACT_PUSH];
   command->reach = c->results[IBVS_OUT_REACH];
   const bool solved = ibvs_solve(&c->program, &solution);
   command->iterations = solution.iterations > 0 ? solution.iterations : 0;
@@ -154,7 +154,7 @@ void ibvs_step_packed(ibvs_controller *c, ibvs_command *command) {
 }
 
 void ibvs_step(ibvs_controller *c, const ibvs_measurement *measurement, const ibvs_reference *reference,
-               ibvs_command *command) {
+               ibvs_command_result *command) {
   ibvs_measurement own;
   memset(command, 0, sizeof *command);
   command->stamp_ns = measurement->stamp_ns;

@@ -6,7 +6,7 @@
  *
  * One ibvs_controller is one instance. There is no global state, no allocation and no blocking call; the largest
  * number of iterations (IBVS_MAX_ITERATIONS) bounds the time of a step. ibvs_step never fails: a refused input is
- * reported in ibvs_command.rejected, and the thrusts stay finite, within their limits and within the rate limit.
+ * reported in ibvs_command_result.rejected, and the thrusts stay finite, within their limits and within the rate limit.
  */
 #ifndef IBVS_QP_H
 #define IBVS_QP_H
@@ -79,7 +79,7 @@ typedef struct {
 
 typedef enum { IBVS_MODE_FREE = 0, IBVS_MODE_APPROACH = 1, IBVS_MODE_CONTACT = 2, IBVS_MODE_HOLD = 3 } ibvs_mode;
 
-/* Bits of ibvs_command.rejected. */
+/* Bits of ibvs_command_result.rejected. */
 enum {
   IBVS_REJECT_STAMP = 1 << 0,
   IBVS_REJECT_ATTITUDE = 1 << 1,
@@ -98,7 +98,8 @@ enum {
   IBVS_REJECT_REFERENCE = 1 << 14,     /* the last accepted one stays in force */
   IBVS_REJECT_GAINS = 1 << 15,         /* the last accepted ones stay in force */
   IBVS_REJECT_PROGRAM = 1 << 16,       /* OSQP's answer failed the acceptance test */
-  IBVS_REJECT_RECOVERING = 1 << 17     /* solved again, not yet for long */
+  IBVS_REJECT_RECOVERING = 1 << 17,    /* solved again, not yet for long */
+  IBVS_REJECT_FEATURES = 1 << 18       /* of ibvs_estimate: features too old, ahead, or not after the last ones */
 };
 
 /* Thrusts of one tick and how they came about. */
@@ -116,15 +117,19 @@ typedef struct {
   ibvs_real distance;                   /* estimated, tip to wall [m], while a wall is known */
   ibvs_real push;                       /* filtered, on the wall [N] */
   ibvs_real reach;                      /* largest push that the limits in force allow [N] */
-} ibvs_command;
+} ibvs_command_result;
+
+/* Stamps to a time that only increases. */
+typedef struct {
+  int64_t shift_ns, last_ns, odd_first, odd_last;
+  int32_t odd_count, jumps;
+} ibvs_clock;
 
 /* One instance; all members are private but `gains`. */
 typedef struct {
   ibvs_gains gains;          /* may be changed between steps; checked at every step */
   ibvs_gains gains_in_force;
-  /* clock */
-  int64_t shift_ns, last_ns, odd_first, odd_last;
-  int32_t odd_count;
+  ibvs_clock clock;
   /* inputs in force */
   bool measured;
   ibvs_measurement last;
@@ -154,10 +159,10 @@ void ibvs_reset(ibvs_controller *controller);
 
 /* Thrusts of one tick. The inputs are copied; no pointer is kept. */
 void ibvs_step(ibvs_controller *controller, const ibvs_measurement *measurement, const ibvs_reference *reference,
-               ibvs_command *command);
+               ibvs_command_result *command);
 
 /* The same from packed inputs (ibvs_layout.h) that a caller has validated; thrusts of earlier ticks included. */
-void ibvs_step_packed(ibvs_controller *controller, ibvs_command *command);
+void ibvs_step_packed(ibvs_controller *controller, ibvs_command_result *command);
 
 #ifdef __cplusplus
 }

@@ -2,16 +2,16 @@
  * See ibvs_qp.validation. */
 #include "ibvs_internal.h"
 
-void ibvs_clock_reset(ibvs_controller *c) {
+void ibvs_clock_reset(ibvs_clock *c) {
   c->shift_ns = 0;
   c->last_ns = -1;
   c->odd_first = c->odd_last = -1;
-  c->odd_count = 0;
+  c->odd_count = c->jumps = 0;
 }
 
 static bool is_stamp(int64_t stamp) { return stamp >= 0 && stamp < IBVS_STAMP_END; }
 
-static bool accept_stamp(ibvs_controller *c, int64_t stamp) {
+bool ibvs_accept_stamp(ibvs_clock *c, int64_t stamp) {
   if (!is_stamp(stamp)) {
     return false;
   }
@@ -40,12 +40,13 @@ static bool accept_stamp(ibvs_controller *c, int64_t stamp) {
     return false;
   }
   c->odd_count = 0;
+  c->jumps += 1;
   c->last_ns += passed + step;
   c->shift_ns = c->last_ns - stamp;
   return true;
 }
 
-static bool sample_time(const ibvs_controller *c, int64_t stamp, int64_t *time_ns) {
+bool ibvs_sample_time(const ibvs_clock *c, int64_t stamp, int64_t *time_ns) {
   if (!is_stamp(stamp)) {
     return false;
   }
@@ -69,7 +70,8 @@ static bool *flag_of(void *structure, const ibvs_field *field) {
   return (bool *)((char *)structure + field->flag);
 }
 
-static bool within(const ibvs_real *values, const ibvs_field *field) {
+bool ibvs_within(const void *structure, const ibvs_field *field) {
+  const ibvs_real *values = const_entries(structure, field);
   if (field->unit_length) {
     ibvs_real square = 0;
     for (uint32_t i = 0; i < field->size; ++i) {
@@ -90,7 +92,7 @@ static void check_fields(const ibvs_controller *c, ibvs_measurement *own, uint32
   for (uint32_t i = 0; i < IBVS_MEASUREMENT_FIELDS; ++i) {
     const ibvs_field *field = &ibvs_measurement_fields[i];
     const bool optional = field->flag != IBVS_NO_FLAG;
-    if ((optional && !*flag_of(own, field)) || within(entries(own, field), field)) {
+    if ((optional && !*flag_of(own, field)) || ibvs_within(own, field)) {
       continue;
     }
     *rejected |= field->rejected;
@@ -116,23 +118,26 @@ static void check_limit_order(const ibvs_controller *c, ibvs_measurement *own, u
   memcpy(own->thrust_max, c->last.thrust_max, sizeof own->thrust_max);
 }
 
+bool ibvs_good_plane(const ibvs_real plane[4]) {
+  const ibvs_real d = plane[3];
+  return ibvs_finite(plane, 4) && d != 0 && r_fabs(plane[0] / d) < IBVS_INVERSE_DEPTH_BOUND &&
+         r_fabs(plane[1] / d) < IBVS_INVERSE_DEPTH_BOUND && -plane[2] / d > IBVS_INVERSE_DEPTH_MIN &&
+         -plane[2] / d < IBVS_INVERSE_DEPTH_BOUND;
+}
+
 static void check_plane(const ibvs_controller *c, ibvs_measurement *own, uint32_t *rejected) {
   if (!own->has_plane) {
     return;
   }
-  const ibvs_real *plane = own->plane, d = plane[3];
-  const bool good = ibvs_finite(plane, 4) && d != 0 && r_fabs(plane[0] / d) < IBVS_INVERSE_DEPTH_BOUND &&
-                    r_fabs(plane[1] / d) < IBVS_INVERSE_DEPTH_BOUND && -plane[2] / d > IBVS_INVERSE_DEPTH_MIN &&
-                    -plane[2] / d < IBVS_INVERSE_DEPTH_BOUND;
-  if (!good || !sample_time(c, own->plane_stamp_ns, &own->plane_stamp_ns)) {
+  if (!ibvs_good_plane(own->plane) || !ibvs_sample_time(&c->clock, own->plane_stamp_ns, &own->plane_stamp_ns)) {
     *rejected |= IBVS_REJECT_PLANE;
     own->has_plane = false;
   }
 }
 
-/* A sample's stamp in the controller's time, unless the sample is too old. */
-static bool recent(const ibvs_controller *c, int64_t *stamp_ns) {
-  return sample_time(c, *stamp_ns, stamp_ns) && c->last_ns - *stamp_ns <= IBVS_OLDEST_LINE_NS;
+/* A sample's stamp in the clock's time, unless the sample is too old. */
+bool ibvs_recent(const ibvs_clock *c, int64_t *stamp_ns) {
+  return ibvs_sample_time(c, *stamp_ns, stamp_ns) && c->last_ns - *stamp_ns <= IBVS_OLDEST_LINE_NS;
 }
 
 static bool good_line(const ibvs_line *line) {
@@ -149,7 +154,7 @@ static void check_lines(const ibvs_controller *c, ibvs_measurement *own, uint32_
   }
   for (uint32_t i = 0; i < count; ++i) {
     ibvs_line line = own->lines[i];
-    if (good_line(&line) && (line.stamp_ns == 0 || recent(c, &line.stamp_ns))) {
+    if (good_line(&line) && (line.stamp_ns == 0 || ibvs_recent(&c->clock, &line.stamp_ns))) {
       own->lines[kept] = line;
       kept += 1;
     } else {
@@ -161,14 +166,14 @@ static void check_lines(const ibvs_controller *c, ibvs_measurement *own, uint32_
 
 bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, ibvs_measurement *own,
                             uint32_t *rejected) {
-  if (!accept_stamp(c, given->stamp_ns)) {
+  if (!ibvs_accept_stamp(&c->clock, given->stamp_ns)) {
     *rejected |= IBVS_REJECT_STAMP;
     return false;
   }
   *own = *given;
-  own->stamp_ns = c->last_ns;
+  own->stamp_ns = c->clock.last_ns;
   check_fields(c, own, rejected);
-  const bool in_time = sample_time(c, given->wrench_stamp_ns, &own->wrench_stamp_ns);
+  const bool in_time = ibvs_sample_time(&c->clock, given->wrench_stamp_ns, &own->wrench_stamp_ns);
   if (!in_time) {
     *rejected |= IBVS_REJECT_WRENCH_STAMP;
   }
@@ -178,13 +183,13 @@ bool ibvs_check_measurement(ibvs_controller *c, const ibvs_measurement *given, i
   }
   check_plane(c, own, rejected);
   check_lines(c, own, rejected);
-  if (own->has_velocity && own->has_velocity_stamp && !recent(c, &own->velocity_stamp_ns)) {
+  if (own->has_velocity && own->has_velocity_stamp && !ibvs_recent(&c->clock, &own->velocity_stamp_ns)) {
     *rejected |= IBVS_REJECT_VELOCITY_STAMP;
     own->has_velocity = false;
   }
   check_limit_order(c, own, rejected);
   if ((*rejected & IBVS_REJECT_ATTITUDE) != 0 && !c->measured) { /* time begins with the first attitude */
-    ibvs_clock_reset(c);
+    ibvs_clock_reset(&c->clock);
     c->last = ibvs_first_measurement;
     return false;
   }
@@ -199,7 +204,7 @@ bool ibvs_check_reference(ibvs_controller *c, const ibvs_reference *given) {
     own.line_count = IBVS_LINES;
   }
   for (uint32_t i = 0; i < IBVS_REFERENCE_FIELDS; ++i) {
-    if (!within(entries(&own, &ibvs_reference_fields[i]), &ibvs_reference_fields[i])) {
+    if (!ibvs_within(&own, &ibvs_reference_fields[i])) {
       return false;
     }
   }

@@ -23,7 +23,7 @@ static void read_sensors(int64_t now_ns, ibvs_measurement *m) {
   *m = (ibvs_measurement){.stamp_ns = now_ns, .attitude = {1, 0, 0, 0}, .wrench_stamp_ns = now_ns};
 }
 
-static void write_thrusts(const ibvs_command *command) {
+static void write_thrusts(const ibvs_command_result *command) {
   for (int i = 0; i < IBVS_ROTORS; ++i) {
     motor_commands[i] = command->thrusts[i];
   }
@@ -31,7 +31,7 @@ static void write_thrusts(const ibvs_command *command) {
 
 int main(void) {
   static ibvs_measurement measurement;
-  static ibvs_command command;
+  static ibvs_command_result command;
   const ibvs_reference reference = {.standoff = 1};
   uint32_t done = 0;
   ibvs_init(&controller);
