@@ -1,7 +1,8 @@
 """``python -m sim.experiments.law_goals --jobs 2``: fly the missing flights, print every goal with figure and n.
 
 ``before.csv`` holds the figures of the QP of revision 1262c78, whose rows lack the rotors, same scenes, same seeds.
-Exits 1 when a goal is missed. ``--part 0`` only prints.
+Exits 1 when a goal is missed. ``--part 0`` only prints, with ``--markdown`` the table of
+docs/experiments/comparisons.md.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ def main() -> int:
     """Fly, print, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m sim.experiments.law_goals", description=__doc__)
     parser.add_argument("--kinds", nargs="+", help="fly only these kinds of flights")
+    parser.add_argument("--markdown", action="store_true", help="print a Markdown table")
     add_part_options(parser, "runs/law_goals")
     given = parse_part(parser)
     runs = design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric", compiled=True))
@@ -38,7 +40,11 @@ def main() -> int:
     planned = Counter((run.params["kind"], run.params["world"]) for run in runs)
     found = [outcome(goal, table, before, planned[goal.kind, goal.world]) for goal in goals]
     headings = ("figure", "before", "now", "ratio, paired", "goal", "n", "met")
-    Console().print(terminal_table(headings, [each.cells for each in found], text=("figure", "goal")))
+    if given.markdown:
+        rows = [headings, ("---",) * len(headings), *(each.cells for each in found)]
+        print("\n".join("| " + " | ".join(cells) + " |" for cells in rows))
+    else:
+        Console().print(terminal_table(headings, [each.cells for each in found], text=("figure", "goal")))
     return 130 if interrupted else int(not all(each.met for each in found))
 
 
