@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.inputs import Body, MotorThrust
 from ibvs_qp.quaternion import multiply
-from ibvs_qp.symbolic.logic import both, clamp, either, where
+from ibvs_qp.symbolic.logic import both, clamp, either, no, where
 from ibvs_qp.symbolic.signals import Signals
 
 #: Least difference between an attitude and the one predicted by the gyro that is a step [rad], and least one in root
@@ -26,11 +26,14 @@ RETURN_RATE = math.radians(0.5)
 #: Time constant of the gyro's bias [s]: attitude noise of 0.05 deg a sample passes as 0.05 deg/s, a tenth of the
 #: noise of a MEMS gyro. Largest bias [rad/s]: ten times that of a MEMS gyro without calibration.
 BIAS_TIME, MOST_BIAS = 1.0, math.radians(10.0)
+#: Standard deviations of the attitude's noise that count, and time after which an attitude that stays the same is
+#: compared [s]: slower ones are no input of this estimate.
+NOISE_SIGMAS, LONGEST_COMPARED = 2.0, 0.1
 #: From this bandwidth on the attitude estimate counts as it is [Hz].
 UNFILTERED_HZ = 1000.0
 
 
-def continuous_attitude(signals: Signals, measured: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.SX:
+def continuous_attitude(signals: Signals, measured: ca.SX, last: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.SX:
     """Attitude (w, x, y, z) without steps that the gyro did not measure: absorbed at once, given back slowly.
 
     An estimator that re-aligns itself moves its attitude by degrees in one tick. Taken at once, gravity leaks into
@@ -39,13 +42,14 @@ def continuous_attitude(signals: Signals, measured: ca.SX, rate: ca.SX, dt: ca.S
     Args:
         signals: Registry.
         measured: Attitude, (4,).
+        last: Attitude given out in the last tick, measured or not, (4,).
         rate: Angular velocity in B [rad/s], (3,).
         dt: Time since the last tick [s].
     """
     begun, power = signals.state("steps.begun"), signals.state("steps.power")
     # Rotation from the attitude given out to the measured one; without one the measured attitude stays as it is.
     offset, absorbed = signals.state("steps.offset", 4, (1.0, 0.0, 0.0, 0.0)), signals.state("steps.absorbed")
-    last = where(begun, signals.state("steps.last", 4, (1.0, 0.0, 0.0, 0.0)), measured)
+    last = where(begun, last, measured)
     predicted = _product(last, ca.vertcat(1.0, 0.5 * dt * rate))
 
     sine = ca.norm_2(offset[1:])
@@ -65,32 +69,43 @@ def continuous_attitude(signals: Signals, measured: ca.SX, rate: ca.SX, dt: ca.S
     signals.remember("steps.offset", where(steps, new_offset / ca.norm_2(new_offset), offset))
     signals.remember("steps.absorbed", either(steps, absorbed))
     signals.remember("steps.begun", ca.SX(1.0))
-    return signals.remember("steps.last", given)
+    return given
 
 
-def gyro_bias(signals: Signals, attitude: ca.SX, rate: ca.SX, dt: ca.SX) -> ca.SX:
-    r"""Bias of the gyro [rad/s], (3,): the slow part of its difference from the rate of the attitude.
+def gyro_bias(signals: Signals, measured: ca.SX, attitude: ca.SX, rate: ca.SX, dt: ca.SX, elapsed: ca.SX) -> ca.SX:
+    r"""Bias of the gyro [rad/s], (3,): the slow part of its difference from the rate of the measured attitude.
 
     .. math:: \dot b = (\Omega_{gyro} - \Omega_{attitude} - b) / T
 
-    The lever of the tip, 0.7 m, makes a bias of 1 deg/s a drift of the odometer of 12 mm/s.
+    The lever of the tip, 0.7 m, makes a bias of 1 deg/s a drift of the odometer of 12 mm/s. The gyro is integrated
+    until the attitude changes. A difference counts as far as noise and the largest bias explain it: an attitude that
+    re-aligns itself is no rotation.
 
     Args:
-        signals: Registry; its state is kept while no attitude is measured.
-        attitude: (w, x, y, z), (4,).
+        signals: Registry; `continuous_attitude` has the noise of the attitude there.
+        measured: Whether attitude and gyro are measured; after a gap, and after missing ticks, the comparison begins
+            anew and the bias stays.
+        attitude: As measured, (w, x, y, z), (4,).
         rate: Angular velocity as measured [rad/s], (3,).
-        dt: Time since the last tick [s].
+        dt: Time since the last tick, bounded [s].
+        elapsed: The same, not bounded [s].
     """
-    begun = signals.state("gyro.begun")
-    last = where(begun, signals.state("gyro.attitude", 4, (1.0, 0.0, 0.0, 0.0)), attitude)
-    turned = _product(_inverse(last), attitude)
-    turn = 2.0 * where(turned[0] < 0.0, -1.0, 1.0) * turned[1:]
-    bias = signals.state("gyro.bias", 3)
-    difference = rate * dt - turn  # excess turn of the gyro in this tick [rad]
-    bias += where(begun, (difference - bias * dt) / BIAS_TIME, ca.DM.zeros(3))
-    signals.remember("gyro.begun", ca.SX(1.0))
-    signals.remember("gyro.attitude", attitude)
-    return signals.remember("gyro.bias", clamp(bias, -MOST_BIAS, MOST_BIAS))
+    bias, begun = signals.state("gyro.bias", 3), signals.state("gyro.begun")
+    last = signals.state("gyro.attitude", 4, (1.0, 0.0, 0.0, 0.0))
+    whole = both(begun, measured, elapsed <= dt)
+    turned, time = signals.state("gyro.turned", 3) + dt * rate, signals.state("gyro.time") + dt
+    change = _product(_inverse(last), attitude)
+    turn = 2.0 * where(change[0] < 0.0, -1.0, 1.0) * change[1:]
+    due = both(whole, either(ca.norm_2(attitude - last) > 0.0, time >= LONGEST_COMPARED))
+    most = MOST_BIAS * time + NOISE_SIGMAS * ca.sqrt(signals.state("steps.power"))
+    difference = clamp(turned - turn, -most, most)
+    new = clamp(bias + (difference - time * bias) / BIAS_TIME, -MOST_BIAS, MOST_BIAS)
+    anew = either(due, no(whole))
+    signals.remember("gyro.begun", measured)
+    signals.remember("gyro.attitude", where(anew, attitude, last))
+    signals.remember("gyro.turned", where(anew, ca.DM.zeros(3), turned))
+    signals.remember("gyro.time", where(anew, 0.0, time))
+    return signals.remember("gyro.bias", where(due, new, bias))
 
 
 def filtered_roll_pitch(signals: Signals, angles: ca.SX, rates: ca.SX, bandwidth_hz: float, dt: ca.SX) -> ca.SX:

@@ -32,10 +32,10 @@ from ibvs_qp.symbolic.signals import GatedSignals, Signals
 #: Inertial sensors of a frame.
 INERTIAL = ("attitude", "angular_velocity", "specific_force")
 #: Inputs of a tick in the order of packing: times since the last one, bounded and not [s]; attitude, gyro,
-#: accelerometer and whether they are measured; sample of the force sensor, and time since the last one [s], 0 without a
-#: new one; contact wrench in its place, if any, and time since the last one that counts [s]; plane, whether it is new,
-#: its age [s]; whether the tip shall press; whether ticks are missing; specific force by the motors' model [m/s^2];
-#: whether the velocity in the wall plane is young.
+#: accelerometer, whether all of them are measured, and whether the gyro is; sample of the force sensor, and time since
+#: the last one [s], 0 without a new one; contact wrench in its place, if any, and time since the last one that counts
+#: [s]; plane, whether it is new, its age [s]; whether the tip shall press; whether ticks are missing; specific force by
+#: the motors' model [m/s^2]; whether the velocity in the wall plane is young.
 INPUTS = {
     "dt": 1,
     "elapsed": 1,
@@ -43,6 +43,7 @@ INPUTS = {
     "rate": 3,
     "force": 3,
     "measured": 1,
+    "gyro": 1,
     "sample": 6,
     "sample_interval": 1,
     "replaced": 1,
@@ -94,12 +95,14 @@ def prediction_signals(config: ControllerConfig, estimation: EstimationConfig) -
     value = {name: signals.input(name, size) for name, size in INPUTS.items()}
     rates = ca.reshape(signals.input("rates", 2 * SLOTS), 2, SLOTS).T
     starts = {"flown_attitude": (1.0, 0.0, 0.0, 0.0)}
-    motion, turn, *_ = (signals.state(name, size, starts.get(name, 0.0)) for name, size in ROW.items())
+    motion, turn, flown_attitude, _ = (signals.state(name, size, starts.get(name, 0.0)) for name, size in ROW.items())
     dt, rate, force = value["dt"], value["rate"], value["force"]
 
     held = GatedSignals(signals, ca.SX(0.0), no(value["measured"]))  # while the attitude is an estimate
-    attitude = where(value["measured"], continuous_attitude(held, value["attitude"], rate, dt), value["attitude"])
-    rate -= where(value["measured"], gyro_bias(held, attitude, rate, dt), ca.DM.zeros(3))
+    continuous = continuous_attitude(held, value["attitude"], flown_attitude, rate, dt)
+    attitude = where(value["measured"], continuous, value["attitude"])
+    bias = gyro_bias(signals, value["measured"], value["attitude"], rate, dt, value["elapsed"])
+    rate -= where(value["gyro"], bias, ca.DM.zeros(3))
     down = gravity_direction(attitude)
     tick = Tick(dt, value["elapsed"], rate, force, ca.SX(1.0), down, value["doubt"])
 
@@ -176,7 +179,7 @@ class Estimator:
         contact: Wall and contact.
         motion: Velocity, odometer and lines in the wall plane.
         attitude: (w, x, y, z), without steps that the gyro did not measure.
-        rate: Angular velocity [rad/s], (3,).
+        rate: Angular velocity, without the gyro's bias [rad/s], (3,).
         force: Specific force [m/s^2], (3,).
         axes: Axes of the wall and gravity in B.
         wrench: Contact wrench on the vehicle at the centre of mass [N, N m], (6,); wrench_ns: its time.
@@ -187,7 +190,7 @@ class Estimator:
         estimation: Noise models and life times.
     """
 
-    CONSTANTS = ("_memory", "_rates", "_motion", "_row")
+    CONSTANTS = ("_memory", "_rates", "_motion", "_row", "_gyro_bias")
 
     def __init__(self, config: ControllerConfig, estimation: EstimationConfig) -> None:
         self._config, self._estimation, vehicle = config, estimation, config.vehicle
@@ -197,6 +200,7 @@ class Estimator:
         self._memory = memoryview(self._step.values[:count])  # type: ignore[arg-type]
         self._pack = struct.Struct(f"{count}d").pack_into
         self._rates, self._motion = self._step.inputs["rates"], self._step.states["motion"]
+        self._gyro_bias = self._step.states["gyro.bias"]
         self._row = self._step.point[len(self._step.values) :][:row]
         self._history = TickHistory(self._row, config.tick_s)
         self.contact = WallContact(config)
@@ -276,6 +280,7 @@ class Estimator:
             *self.rate,
             *self.force,
             not missing,
+            "angular_velocity" not in missing,
             *(sample if sample_s else _NO_WRENCH),
             sample_s,
             wrench is not None,
@@ -334,7 +339,8 @@ class Estimator:
             angles = {identity: line.angle for identity, line in self.motion.lines.items()}
             fallback.begin(self.attitude, self.rate, self.contact.state.normal, angles)
         attitude, rate, force = (None if name in missing else measured[name] for name in INERTIAL)
-        fallback.step(stamp, dt, motors.angular_acceleration, attitude, rate)
+        unbiased = None if rate is None else np.subtract(rate, self._gyro_bias).tolist()
+        fallback.step(stamp, dt, motors.angular_acceleration, attitude, unbiased)
         self.attitude, self.rate = attitude or fallback.attitude, rate or fallback.rate
         self.force = force or motors.modelled_force
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from symbolic_block import Block
 
+from ibvs_qp.config import LONGEST_TICK
 from ibvs_qp.estimation.attitude import (
     BIAS_TIME,
     MOST_BIAS,
@@ -18,6 +20,7 @@ from ibvs_qp.estimation.attitude import (
     filtered_roll_pitch,
     gyro_bias,
 )
+from ibvs_qp.symbolic.signals import Signals
 
 TICK = 0.004
 REST = (0.0, 0.0, 0.0)
@@ -27,11 +30,12 @@ class AttitudeSteps:
     """The continuous attitude, or None while it is the measured one."""
 
     def __init__(self) -> None:
-        self._block = Block(
-            lambda signals: continuous_attitude(
-                signals, signals.input("measured", 4), signals.input("rate", 3), signals.input("dt")
-            )
-        )
+        def build(signals: Signals) -> ca.SX:
+            measured, rate, dt = signals.input("measured", 4), signals.input("rate", 3), signals.input("dt")
+            given = continuous_attitude(signals, measured, signals.state("given", 4), rate, dt)
+            return signals.remember("given", given)
+
+        self._block = Block(build)
 
     def update(self, attitude: list[float], rate: tuple[float, float, float], dt: float) -> list[float] | None:
         given = self._block(measured=attitude, rate=rate, dt=dt).tolist()
@@ -153,28 +157,72 @@ def test_at_the_largest_bandwidth_the_attitude_is_taken_as_it_is() -> None:
         np.testing.assert_array_equal(estimate(angles=[0.03, 0.01], rates=[5.0, -5.0]), [0.03, 0.01])
 
 
-def bias_after(seconds: float, bias: float, noise_deg: float = 0.0) -> np.ndarray:
-    """Estimate [rad/s] of a gyro with a bias about all axes, on a vehicle that rolls by 10 deg at 0.5 Hz."""
-    block = Block(
-        lambda signals: gyro_bias(signals, signals.input("attitude", 4), signals.input("rate", 3), signals.input("dt"))
-    )
-    rng, swing, found = np.random.default_rng(2), math.radians(10.0), np.zeros(3)
-    for tick in range(1, round(seconds / TICK) + 1):
-        phase, middle = math.pi * tick * TICK, math.pi * (tick - 0.5) * TICK
-        attitude = quaternion(math.degrees(swing * math.sin(phase)) + rng.normal(0.0, noise_deg), 0.0, 0.0)
-        found = block(attitude=attitude, rate=(swing * math.pi * math.cos(middle) + bias, bias, bias), dt=TICK)
-    return found
+class Gyro:
+    """A gyro with a bias about all axes beside an attitude estimate, on a vehicle that rolls by 10 deg at 0.5 Hz."""
+
+    def __init__(self, bias: float = 0.0, noise_deg: float = 0.0, held: int = 1) -> None:
+        def build(signals: Signals) -> ca.SX:
+            attitude, rate = signals.input("attitude", 4), signals.input("rate", 3)
+            measured, dt, elapsed = (signals.input(name) for name in ("measured", "dt", "elapsed"))
+            found = gyro_bias(signals, measured, attitude, rate, dt, elapsed)
+            signals.remember("steps.power", signals.state("steps.power", start=3.0 * math.radians(noise_deg) ** 2))
+            return found
+
+        self._block, self._rng = Block(build), np.random.default_rng(2)
+        self._bias, self._noise, self._held = bias, noise_deg, held
+        self.seconds, self.yaw_deg, self._tick, self._last = 0.0, 0.0, 0, [1.0, 0.0, 0.0, 0.0]
+
+    def run(self, seconds: float, measured: bool = True, elapsed: float = TICK) -> np.ndarray:
+        """The estimate [rad/s] after ticks of a length."""
+        swing, found = math.radians(10.0), np.zeros(3)
+        for _ in range(round(seconds / elapsed)):
+            middle = math.pi * (self.seconds + 0.5 * elapsed)
+            self.seconds += elapsed
+            roll = math.degrees(swing * math.sin(math.pi * self.seconds)) + self._rng.normal(0.0, self._noise)
+            if self._tick % self._held == 0:
+                self._last = quaternion(roll, 0.0, self.yaw_deg)
+            self._tick += 1
+            rate = (swing * math.pi * math.cos(middle) + self._bias, self._bias, self._bias)
+            dt = min(elapsed, LONGEST_TICK)
+            found = self._block(attitude=self._last, rate=rate, measured=measured, dt=dt, elapsed=elapsed)
+        return found
 
 
 @pytest.mark.parametrize("bias", [0.0, math.radians(3.0), -math.radians(3.0)])
 def test_the_bias_of_a_gyro_is_found_while_the_vehicle_moves(bias: float) -> None:
-    np.testing.assert_allclose(bias_after(8.0 * BIAS_TIME, bias), bias, atol=5e-4 * abs(bias) + 1e-5)
+    np.testing.assert_allclose(Gyro(bias).run(8.0 * BIAS_TIME), bias, atol=5e-4 * abs(bias) + 1e-5)
+
+
+@pytest.mark.parametrize(("held", "ripple_deg_s"), [(5, 0.02), (25, 0.3)])
+def test_an_attitude_of_50_or_10_hz_is_enough(held: int, ripple_deg_s: float) -> None:
+    bias = math.radians(3.0)
+    np.testing.assert_allclose(Gyro(bias, held=held).run(8.0), bias, atol=math.radians(ripple_deg_s))
 
 
 def test_noise_of_the_attitude_is_no_bias() -> None:
-    found = [bias_after(BIAS_TIME + 0.1 * k, 0.0, noise_deg=0.1)[0] for k in range(10)]
+    found = [Gyro(noise_deg=0.1).run(BIAS_TIME + 0.1 * k)[0] for k in range(10)]
     assert np.abs(found).max() < 3.0 * math.radians(0.1) / BIAS_TIME
 
 
 def test_a_bias_beyond_any_gyro_is_bounded() -> None:
-    np.testing.assert_allclose(bias_after(4.0, 1.0), MOST_BIAS)
+    found = Gyro(1.0).run(6.0 * BIAS_TIME)
+    np.testing.assert_allclose(found, MOST_BIAS, rtol=0.01)
+    assert (found <= MOST_BIAS).all()
+
+
+@pytest.mark.parametrize("step_deg", [0.9, 2.0, 30.0])
+def test_a_step_of_the_attitude_is_no_bias(step_deg: float) -> None:
+    """It counts as two standard deviations of the noise, and is forgotten in a second."""
+    gyro = Gyro(noise_deg=0.05)
+    gyro.run(1.0)
+    gyro.yaw_deg = step_deg
+    assert abs(gyro.run(TICK)[2]) < math.radians(0.3) and abs(gyro.run(3.0)[2]) < math.radians(0.1)
+
+
+def test_after_missing_ticks_and_outages_the_comparison_begins_anew() -> None:
+    bias = math.radians(3.0)
+    gyro = Gyro(bias)
+    gyro.run(8.0)
+    for measured, elapsed in ((True, 0.3), (False, TICK)):
+        np.testing.assert_allclose(gyro.run(0.6, measured=measured, elapsed=elapsed), bias, rtol=1e-2)
+        np.testing.assert_allclose(gyro.run(0.1), bias, rtol=1e-2)

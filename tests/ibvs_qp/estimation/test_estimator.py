@@ -108,6 +108,20 @@ def test_the_bias_of_a_gyro_is_no_rotation() -> None:
     np.testing.assert_allclose(hover.estimator.motion.state[:3], 0.0, atol=5e-3)
 
 
+@pytest.mark.parametrize("missing", [("specific_force",), ("attitude",)])
+def test_the_bias_stays_known_while_another_sensor_fails(missing: tuple[str, ...]) -> None:
+    hover = flown()
+    turn = hover.rate
+    hover.rate = turn + np.radians([3.0, 3.0, -3.0])
+    for _ in range(2000):
+        hover.step()
+    for _ in range(250):
+        hover.step(missing=missing)
+        np.testing.assert_allclose(hover.estimator.rate, turn, atol=2e-3)
+    now = attitude(yaw=0.1 * 0.004 * hover.tick)
+    assert abs(np.dot(hover.estimator.attitude, now)) == pytest.approx(1.0, abs=1e-5)
+
+
 def test_a_gyro_that_fails_is_replaced_and_the_attitude_goes_on() -> None:
     hover = flown()
     for _ in range(100):

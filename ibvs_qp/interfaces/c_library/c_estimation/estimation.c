@@ -117,7 +117,7 @@ static void predict(ibvs_flight *f, bool plane_new) {
   memcpy(&in[IBVS_PREDICT_ATTITUDE], frame->attitude, sizeof frame->attitude);
   memcpy(&in[IBVS_PREDICT_RATE], frame->angular_velocity, sizeof frame->angular_velocity);
   memcpy(&in[IBVS_PREDICT_FORCE], frame->specific_force, sizeof frame->specific_force);
-  in[IBVS_PREDICT_MEASURED] = 1;
+  in[IBVS_PREDICT_MEASURED] = in[IBVS_PREDICT_GYRO] = 1;
   for (uint32_t i = 0; i < 6; ++i) {
     in[IBVS_PREDICT_SAMPLE + i] = sampled ? frame->wrench[i] : 0;
   }
