@@ -361,7 +361,7 @@ class EnvelopeMonitor:
 
 
 class RotorMonitor:
-    """Finds rotors by the thrust they miss (`ibvs_qp.model.response.missing_thrust`).
+    """Finds rotors by the thrust they miss (`ibvs_qp.estimation.response.missing_thrust`).
 
     Attributes:
         limits: Lower and upper thrusts of faulty rotors, vehicle limits for the others [N], (n,) each; None while no

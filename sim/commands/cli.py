@@ -100,9 +100,13 @@ def _run(words: list[str]) -> int:
     except MemoryError:
         return _user_error("not enough memory")
     except ModuleNotFoundError as error:
-        if error.name != "polars":
+        package = (error.name or "").split(".")[0]
+        if package == "polars":
+            return _user_error(f"{words[0]} needs the extra studies: pip install -c constraints.txt -e '.[studies]'")
+        if package in ("", "allocation", "ibvs_qp", "sim"):
             return _internal_error()
-        return _user_error(f"{words[0]} needs the extra studies: pip install -c constraints.txt -e '.[studies]'")
+        whole = "pip install -c constraints.txt -e ."
+        return _user_error(f"{package} is not installed; ibvs-qp needs the whole installation: {whole}")
     except KeyboardInterrupt:
         print("ibvs-qp: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -167,12 +171,12 @@ def _commands() -> dict[str, type[Command]]:
 
 def _parse(words: list[str]) -> Command:
     """Parse the arguments; an error of the parser becomes one line on standard error."""
-    import tyro
-
-    commands = _commands()
     if words[:1] == ["--version"]:
         print(f"ibvs-qp {ibvs_qp.__version__}")
         raise SystemExit(0)
+    import tyro
+
+    commands = _commands()
     if words and not words[0].startswith("-") and words[0] not in commands:
         near = difflib.get_close_matches(words[0], commands, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands are {', '.join(commands)}"

@@ -1,5 +1,5 @@
-/* Thrusts without a solution of the program: hover, and the analytic law within the limits. See ibvs_qp.safety.hover,
- * ibvs_qp.analytic and allocation.least_squares. */
+/* Thrusts without a solution of the program: hover, and the analytic law within the limits. See ibvs_qp.model.hover,
+ * ibvs_qp.analytic and allocation.allocators. */
 #include "ibvs_internal.h"
 
 static void thrusts_of(const ibvs_real wrench[6], ibvs_real thrusts[IBVS_ROTORS]) {

@@ -1,4 +1,4 @@
-/* Measurement and reference into the inputs of the tick; see ibvs_qp.model.packing and ibvs_qp.model.pairing. */
+/* Measurement and reference into the inputs of the tick; see ibvs_qp.model.packing. */
 #include "ibvs_internal.h"
 
 #define SECONDS(ns) (R(1e-9) * (ibvs_real)(ns))

@@ -299,19 +299,28 @@ static ibvs_line image_line(const ibvs_flight *f, const ibvs_tracked_line *line,
                      .variance = variance / (depth * depth), .stamp_ns = f->frame.stamp_ns, .role = line->role};
 }
 
-static uint32_t add_lines(const ibvs_flight *f, const int64_t *followed, uint32_t count, ibvs_measurement *m) {
+/* Measured lines in the places of the reference's. A line that is gone, or has another role, keeps its place with
+ * weight 0: the law pairs lines by role and order. */
+static uint32_t add_lines(const ibvs_flight *f, const ibvs_reference *reference, const int64_t *followed,
+                          uint32_t count, ibvs_measurement *m) {
   const ibvs_estimates *now = &f->now;
   const ibvs_real distance = now->wall_known ? now->distance : IBVS_ASSUMED_DISTANCE;
-  uint32_t rejected = 0;
-  for (uint32_t i = 0; i < count; ++i) {
+  const uint32_t lines = reference->line_count < IBVS_LINES ? reference->line_count : IBVS_LINES;
+  count = followed == NULL ? 0 : count;
+  uint32_t rejected = count != reference->line_count ? IBVS_REJECT_LINES : 0;
+  for (m->line_count = 0; m->line_count < lines; ++m->line_count) {
+    const uint32_t i = m->line_count;
+    const ibvs_line_reference *target = &reference->lines[i];
     const ibvs_tracked_line *found = NULL;
-    for (uint32_t k = 0; k < now->line_count; ++k) {
-      found = now->lines[k].track_id == followed[i] ? &now->lines[k] : found;
+    for (uint32_t k = 0; k < now->line_count && i < count; ++k) {
+      const bool same = now->lines[k].track_id == followed[i] && now->lines[k].role == target->role;
+      found = same ? &now->lines[k] : found;
     }
-    if (found != NULL && m->line_count < IBVS_MOST_LINES) {
-      m->lines[m->line_count] = image_line(f, found, distance);
-      m->line_count += 1;
+    if (found != NULL) {
+      m->lines[i] = image_line(f, found, distance);
     } else {
+      m->lines[i] = (ibvs_line){.rho = target->rho, .theta = target->theta, .stamp_ns = f->frame.stamp_ns,
+                                .role = target->role};
       rejected = IBVS_REJECT_LINES;
     }
   }
@@ -353,7 +362,7 @@ void ibvs_command(ibvs_flight *f, const ibvs_reference *reference, const int64_t
   m.stamp_ns = -1; /* of no tick: the controller holds */
   if (f->now.valid) {
     measure(f, &m);
-    rejected |= add_lines(f, followed, count, &m);
+    rejected |= add_lines(f, reference, followed, count, &m);
     f->controller.inputs[IBVS_IN_GIVEN] = 1;
     for (uint32_t i = 0; i < IBVS_GIVEN_ENTRIES; ++i) {
       f->controller.inputs[ibvs_given_places[i][0]] = f->predicted[ibvs_given_places[i][1]];

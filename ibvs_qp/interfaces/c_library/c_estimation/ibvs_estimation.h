@@ -142,7 +142,8 @@ void ibvs_flight_reset(ibvs_flight *flight);
 void ibvs_estimate(ibvs_flight *flight, const ibvs_frame *frame, const ibvs_features *features,
                    ibvs_estimates *estimates);
 
-/* Thrusts of the tick. followed: track_id of the lines of the reference, of each role in the reference's order. */
+/* Thrusts of the tick. followed: track_id of every line of the reference, count is the reference's line_count. A line
+ * that is not tracked, or has another role, has no weight in this tick: IBVS_REJECT_LINES. */
 void ibvs_command(ibvs_flight *flight, const ibvs_reference *reference, const int64_t *followed, uint32_t count,
                   ibvs_command_result *command);
 

@@ -180,6 +180,26 @@ def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
     assert own.estimate(later).rejected == REJECT_FEATURES
 
 
+def test_a_line_that_is_gone_leaves_the_others_their_targets() -> None:
+    """The law pairs by role and order: without a place for the first line, the second would have its target."""
+    config, ticks = CASES[CASE].config(), recorded_flight(CASE)
+    place = next(place for place, tick in enumerate(ticks) if tick.followed) + 300
+    thrusts = []
+    for gone in (False, True):
+        own = flight_instance(config)
+        for tick, followed, *_ in ticks[:place]:
+            own.estimate(tick.frame)
+            own.act(tick.reference, followed)
+        for tick, followed, *_ in ticks[place : place + 5]:
+            (line, *_), first = tick.reference.lines, (77,) * gone
+            aside = (dataclasses.replace(line, rho=line.rho + 0.1),) * gone
+            own.estimate(tick.frame)
+            command = own.act(dataclasses.replace(tick.reference, lines=(*aside, line)), (*first, followed[0]))
+            assert command.rejected == (REJECT_LINES if gone else 0)
+        thrusts.append(np.array(command.thrusts))
+    np.testing.assert_allclose(*thrusts, atol=0.5)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["heavy_noise", "octorotor"])
 def test_further_flights_give_the_estimates_of_python(case: str) -> None:
