@@ -29,6 +29,9 @@ BIAS_TIME, MOST_BIAS = 1.0, math.radians(10.0)
 #: Standard deviations of the attitude's noise that count, and time after which an attitude that stays the same is
 #: compared [s]: slower ones are no input of this estimate.
 NOISE_SIGMAS, LONGEST_COMPARED = 2.0, 0.1
+#: Bias that is not subtracted [rad/s]: three standard deviations of this estimate in the world datasheet, so that a
+#: sound gyro stays as it is; 5 mm/s at the tip.
+UNCERTAIN_BIAS = math.radians(0.4)
 #: From this bandwidth on the attitude estimate counts as it is [Hz].
 UNFILTERED_HZ = 1000.0
 
@@ -73,7 +76,7 @@ def continuous_attitude(signals: Signals, measured: ca.SX, last: ca.SX, rate: ca
 
 
 def gyro_bias(signals: Signals, measured: ca.SX, attitude: ca.SX, rate: ca.SX, dt: ca.SX, elapsed: ca.SX) -> ca.SX:
-    r"""Bias of the gyro [rad/s], (3,): the slow part of its difference from the rate of the measured attitude.
+    r"""Certain part of the gyro's bias [rad/s], (3,): the slow difference from the rate of the measured attitude.
 
     .. math:: \dot b = (\Omega_{gyro} - \Omega_{attitude} - b) / T
 
@@ -91,6 +94,7 @@ def gyro_bias(signals: Signals, measured: ca.SX, attitude: ca.SX, rate: ca.SX, d
         elapsed: The same, not bounded [s].
     """
     bias, begun = signals.state("gyro.bias", 3), signals.state("gyro.begun")
+    signals.state("gyro.excess", 3)
     last = signals.state("gyro.attitude", 4, (1.0, 0.0, 0.0, 0.0))
     whole = both(begun, measured, elapsed <= dt)
     turned, time = signals.state("gyro.turned", 3) + dt * rate, signals.state("gyro.time") + dt
@@ -105,7 +109,8 @@ def gyro_bias(signals: Signals, measured: ca.SX, attitude: ca.SX, rate: ca.SX, d
     signals.remember("gyro.attitude", where(anew, attitude, last))
     signals.remember("gyro.turned", where(anew, ca.DM.zeros(3), turned))
     signals.remember("gyro.time", where(anew, 0.0, time))
-    return signals.remember("gyro.bias", where(due, new, bias))
+    found = signals.remember("gyro.bias", where(due, new, bias))
+    return signals.remember("gyro.excess", found - clamp(found, -UNCERTAIN_BIAS, UNCERTAIN_BIAS))
 
 
 def filtered_roll_pitch(signals: Signals, angles: ca.SX, rates: ca.SX, bandwidth_hz: float, dt: ca.SX) -> ca.SX:

@@ -200,7 +200,7 @@ class Estimator:
         self._memory = memoryview(self._step.values[:count])  # type: ignore[arg-type]
         self._pack = struct.Struct(f"{count}d").pack_into
         self._rates, self._motion = self._step.inputs["rates"], self._step.states["motion"]
-        self._gyro_bias = self._step.states["gyro.bias"]
+        self._gyro_bias = self._step.states["gyro.excess"]
         self._row = self._step.point[len(self._step.values) :][:row]
         self._history = TickHistory(self._row, config.tick_s)
         self.contact = WallContact(config)
