@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from fresh_equations import fresh_equations
 
-from ibvs_qp import controller
 from ibvs_qp.config import ControllerConfig, LimitSettings
 from ibvs_qp.estimation.wall_motion import WallMotion
 from ibvs_qp.measurement import FeatureFrame
@@ -24,6 +23,7 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace import Trace
 from sim.world.scene import Scene
 
+pytestmark = pytest.mark.usefixtures(fresh_equations.__name__)
 #: Nothing upright in the picture: the brush is half a metre off the right edge.
 SCENE = near_wall(start={"right_m": -0.5})
 #: Push that the nominal vehicle can hold standing still [N].
@@ -67,14 +67,6 @@ def held(trace: Trace) -> np.ndarray:
 def rocking(trace: Trace) -> float:
     """Largest yaw while held [deg]."""
     return float(np.degrees(np.abs(trace.euler[held(trace), 2])).max())
-
-
-@pytest.fixture(autouse=True)
-def fresh_equations() -> Iterator[None]:
-    """Equations with the patches of the test, which no other test shares."""
-    controller._shipped_problem.cache_clear()
-    yield
-    controller._shipped_problem.cache_clear()
 
 
 @pytest.mark.parametrize("law", ["qp", "paper"])

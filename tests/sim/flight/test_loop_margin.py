@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from closed_loop_rigs import HoldPainter, run, short_scene, wall
+from fresh_equations import fresh_equations
 
 import ibvs_qp
 from ibvs_qp.config import ControllerConfig
@@ -95,6 +96,7 @@ def ringing(push: np.ndarray, dt: float, least: float = 0.05) -> tuple[float, fl
     return ratio, 0.5 / half_period / math.sqrt(1.0 - ratio**2)
 
 
+@pytest.mark.usefixtures(fresh_equations.__name__)
 @pytest.mark.parametrize("force_kfp", [0.8, 1.6, 2.2])  # with the shipped 0.02 nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reach, "RISE", 1e3)  # a step that is slewed in is no step
