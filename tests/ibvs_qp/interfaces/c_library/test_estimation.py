@@ -26,6 +26,8 @@ CASE = "press_beyond_reach"
 #: Largest difference of an estimate, in units of its own. Prediction and correction have the same bits; the sums that
 #: carry a correction to the present have not: numpy multiplies matrices in another order.
 ESTIMATE = 1e-9
+#: The same where thrusts differ by 1 mN, which the motors' model passes to the velocity: 2e-9 m/s found.
+OCTOROTOR_ESTIMATE = 1e-8
 #: Largest difference of a thrust [N]: that of the law alone.
 THRUST_N = 5e-6
 #: The same in single precision; the stiffness, a quotient of two long sums, errs by 5 % [N/m].
@@ -203,10 +205,14 @@ def test_a_line_that_is_gone_leaves_the_others_their_targets() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["heavy_noise", "octorotor"])
 def test_further_flights_give_the_estimates_of_python(case: str) -> None:
-    """Redundant thrusts of eight rotors have a weight of 0.01 only."""
+    """The push reference is of the law: it follows the thrusts, as a velocity does by the motors' model.
+
+    Redundant thrusts of eight rotors have a weight of 0.01 only: they differ by up to 1 mN.
+    """
     largest = differences(flight_instance(CASES[case].config()), recorded_flight(case))
     assert largest.pop("thrusts") <= (1e-3 if case == "octorotor" else THRUST_N)
-    assert max(largest.values()) <= ESTIMATE, largest
+    assert largest.pop("push_reference") <= THRUST_N
+    assert max(largest.values()) <= (OCTOROTOR_ESTIMATE if case == "octorotor" else ESTIMATE), largest
 
 
 @pytest.mark.slow
@@ -214,4 +220,5 @@ def test_further_flights_give_the_estimates_of_python(case: str) -> None:
 def test_flights_in_single_precision_give_the_estimates_of_python(case: str) -> None:
     largest = differences(flight_instance(CASES[case].config(), single=True), recorded_flight(case))
     assert largest.pop("thrusts") <= SINGLE_THRUST_N and largest.pop("stiffness") <= SINGLE_STIFFNESS
+    assert largest.pop("push_reference") <= SINGLE_THRUST_N
     assert max(largest.values()) <= SINGLE, largest
