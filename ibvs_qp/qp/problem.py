@@ -7,6 +7,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import gt, lt
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -295,8 +296,8 @@ class ProgramData:
     @property
     def beyond_limits(self) -> bool:
         """Whether the thrusts without limits pass a thrust limit, by noise or by more."""
-        n = len(self.free)
-        return bool((self.free < self.lower[:n]).any() or (self.free > self.upper[:n]).any())
+        free = self.free.tolist()
+        return any(map(lt, free, self.lower.tolist())) or any(map(gt, free, self.upper.tolist()))
 
     def hessian(self) -> np.ndarray:
         """P in full, (variables, variables)."""
