@@ -21,7 +21,6 @@ from ibvs_qp.config.settings import dump_toml, load_toml
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
 from sim.detection.manifest import COLUMNS
-from sim.detection.truth import FAMILIES, render_frame, sample_scene
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
 from sim.flight.flight_log import load_run
@@ -31,6 +30,7 @@ from sim.sweep.parts import frame, write_table
 from sim.sweep.spec import load_spec
 from sim.world.errors import WorldErrors
 from sim.world.scene import Scene
+from tests.support.truth import FAMILIES, render_frame, sample_scene
 
 ROOT = Path(__file__).parents[2]
 #: Pieces that parsers and programs stumble over.

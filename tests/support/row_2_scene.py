@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA
-from sim.detection.truth.scenes import LIGHT, PAINTS, TruthScene, turned
+from tests.support.truth.scenes import LIGHT, PAINTS, TruthScene, turned
 
 #: Largest relative change of the light across half a row-2 view: the colour gate between board and wall in flight
 #: is 42 grey levels, a tenth of a white board's colour.

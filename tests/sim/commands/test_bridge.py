@@ -24,9 +24,9 @@ from ibvs_qp.interfaces.ros.messages import typestore
 from ibvs_qp.interfaces.ros.write_bag import write_bag
 from ibvs_qp.vision.picture.lens import Lens
 from sim.commands.cli import main
-from sim.detection.truth import FAMILIES, render_frame, sample_scene
-from sim.detection.truth.accuracy import line_errors
-from sim.detection.truth.devices import REALSENSE_D435
+from tests.support.truth import FAMILIES, render_frame, sample_scene
+from tests.support.truth.accuracy import line_errors
+from tests.support.truth.devices import REALSENSE_D435
 
 
 @pytest.fixture(autouse=True)

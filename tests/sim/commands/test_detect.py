@@ -13,8 +13,8 @@ import pytest
 
 from sim.commands.cli import main
 from sim.detection.manifest import FrameEntry, motion_sequences
-from sim.detection.truth import FAMILIES, TruthFrame, render_frame, sample_scene
-from sim.detection.truth.accuracy import line_errors
+from tests.support.truth import FAMILIES, TruthFrame, render_frame, sample_scene
+from tests.support.truth.accuracy import line_errors
 
 LINE = {"x1", "y1", "x2", "y2", "rho", "theta", "covariance", "score", "confidence", "length_px", "borders_plane", "id"}
 FRAME = {"color", "depth", "method", "refused", "plane", "candidates", "guides", "tracked", "time_ms"}

@@ -15,9 +15,9 @@ import tomli_w
 
 from ibvs_qp.vision.picture.lens import Lens
 from sim.commands.cli import main
-from sim.detection.truth import FAMILIES, TruthFrame, render_frame, sample_scene
-from sim.detection.truth.accuracy import line_errors
-from sim.detection.truth.devices import ORBBEC
+from tests.support.truth import FAMILIES, TruthFrame, render_frame, sample_scene
+from tests.support.truth.accuracy import line_errors
+from tests.support.truth.devices import ORBBEC
 
 SETTINGS: dict[str, Any] = {
     "distortion": list(ORBBEC.distortion),

@@ -22,7 +22,7 @@ from sim.commands.cli import main
 from sim.detection import manifest, pictures
 from sim.detection.manifest import COLUMNS
 from sim.detection.pictures import PictureError, read_color, read_depth
-from sim.detection.truth import FAMILIES, render_frame, sample_scene
+from tests.support.truth import FAMILIES, render_frame, sample_scene
 
 pytestmark = pytest.mark.timeout(120)
 EXTREMES = "nan inf -inf 1e308 -1e308 1e160 1e5 -1e10 1.0001 1e-320 0 -0 1_000 ٣ 1e400 0x10 9" + "9" * 400

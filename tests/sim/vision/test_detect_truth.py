@@ -12,9 +12,9 @@ from ibvs_qp.frames import align_line
 from ibvs_qp.vision.lines.guides import GuideKeeper
 from ibvs_qp.vision.lines.line_state import TrackState
 from sim.detection.own import OwnMethod
-from sim.detection.truth import FAMILIES, TruthScene, Variation, render_frame, sample_scene
-from sim.detection.truth.accuracy import Errors, line_errors, measure_family
-from sim.detection.truth.scenes import turned
+from tests.support.truth import FAMILIES, TruthScene, Variation, render_frame, sample_scene
+from tests.support.truth.accuracy import Errors, line_errors, measure_family
+from tests.support.truth.scenes import turned
 
 #: Families in which every edge must be found; the others ask for edges that colour alone can show, or are of devices
 #: (tests/sim/detection/truth/test_devices.py).

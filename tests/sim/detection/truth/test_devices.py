@@ -14,11 +14,11 @@ from ibvs_qp.measurement import FeatureFrame, LineFeature
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.vision.picture.lens import Lens
 from sim.detection.own import OwnMethod
-from sim.detection.truth import FAMILIES, TruthFrame, TruthScene, render_frame, sample_scene
-from sim.detection.truth.accuracy import line_errors, measure_family
-from sim.detection.truth.device_depth import device_depth
-from sim.detection.truth.device_picture import exposure_gain
-from sim.detection.truth.devices import ORBBEC, REALSENSE_D435, Device
+from tests.support.truth import FAMILIES, TruthFrame, TruthScene, render_frame, sample_scene
+from tests.support.truth.accuracy import line_errors, measure_family
+from tests.support.truth.device_depth import device_depth
+from tests.support.truth.device_picture import exposure_gain
+from tests.support.truth.devices import ORBBEC, REALSENSE_D435, Device
 
 DEVICES = {"realsense_d435": REALSENSE_D435, "orbbec": ORBBEC}
 

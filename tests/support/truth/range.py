@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from sim.detection.truth.scenes import TruthScene
 from sim.sensors.cameras.noise import DEPTH_COMMON_SIGMA_M, DEPTH_CORRELATION_PX
+from tests.support.truth.scenes import TruthScene
 
 #: Widest hole along a step [px] and length over which its width changes [px].
 _HOLE_PX, _HOLE_STEP_PX = 4, 6

@@ -10,12 +10,12 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.picture.camera import RgbdCamera
-from sim.detection.truth.device_depth import device_depth
-from sim.detection.truth.picture import paint_picture
-from sim.detection.truth.range import measure_depth
-from sim.detection.truth.scenes import TruthScene
 from sim.sensors.cameras.arm import vehicle_layer
 from sim.world.scene import CameraScene, Scene
+from tests.support.truth.device_depth import device_depth
+from tests.support.truth.picture import paint_picture
+from tests.support.truth.range import measure_depth
+from tests.support.truth.scenes import TruthScene
 
 #: Shortest visible piece of an edge in view, and margin from the border of a picture 640 px wide [px].
 _SHORTEST_PX, _MARGIN_PX = 40.0, 8.0

@@ -7,10 +7,10 @@ import functools
 import cv2
 import numpy as np
 
-from sim.detection.truth.device_picture import exposure_gain, through_device
-from sim.detection.truth.scenes import TruthScene
 from sim.world.clutter import clutter_board
 from sim.world.textures import flat, shade, smooth_noise, wall_surface
+from tests.support.truth.device_picture import exposure_gain, through_device
+from tests.support.truth.scenes import TruthScene
 
 #: Subpixels per pixel and side; resolution of the textures [px/m]; width of the wall beyond the board [m].
 SUPERSAMPLING, _PX_M, _WALL_M = 3, 1100.0, 0.5

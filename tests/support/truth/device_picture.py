@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.picture.lens import Lens
-from sim.detection.truth.scenes import TruthScene
 from sim.sensors.image_motion import image_velocity
+from tests.support.truth.scenes import TruthScene
 
 
 def through_device(picture: np.ndarray, scene: TruthScene, times: int) -> np.ndarray:

@@ -7,8 +7,8 @@ import numpy as np
 
 from ibvs_qp.frames import rotation_from_vector
 from ibvs_qp.vision.picture.lens import Lens
-from sim.detection.truth.devices import Device
-from sim.detection.truth.scenes import TruthScene
+from tests.support.truth.devices import Device
+from tests.support.truth.scenes import TruthScene
 
 #: Length along an edge over which the width of a hole, or the growth of a surface, changes [px].
 _EDGE_STEP_PX, _GROWTH_STEP_PX = 6, 20.0

@@ -1,4 +1,4 @@
-"""Accuracy of a detector on the edges of truth frames: ``python -m sim.detection.truth.accuracy --frames 40``."""
+"""Accuracy of a detector on the edges of truth frames: ``python -m tests.support.truth.accuracy --frames 40``."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ibvs_qp.frames import align_line
 from ibvs_qp.vision.picture.picture import normalise
 from sim.detection.detection import GUIDE_SIDES, Detection
 from sim.detection.methods import METHODS, make_method
-from sim.detection.truth.frame import TrueLine, TruthFrame, render_frame
-from sim.detection.truth.scenes import FAMILIES, TruthScene, sample_scene
+from tests.support.truth.frame import TrueLine, TruthFrame, render_frame
+from tests.support.truth.scenes import FAMILIES, TruthScene, sample_scene
 
 #: Match: largest distance of both ends of the true segment from the line [px], and largest angle [deg].
 MATCH_PX, MATCH_DEG = 4.0, 2.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-from sim.detection.truth.devices import ORBBEC, REALSENSE_D435, Device
+from tests.support.truth.devices import ORBBEC, REALSENSE_D435, Device
 
 #: RGB colours of boards and paints.
 LIGHT = ((228, 230, 222), (214, 205, 188), (196, 204, 214))
