@@ -128,7 +128,7 @@ def _analytic_model(config: ControllerConfig) -> Model:
 class PaperController(CheckedLaw):
     """The paper's law with the same measurement, reference and command as the program.
 
-    A subclass may replace the law: its set-points and its command.
+    A law of your own is a subclass with another `thrusts`; checks of inputs, estimates, set-points and limits stay.
     """
 
     def __init__(self, config: ControllerConfig | None = None) -> None:
@@ -139,7 +139,16 @@ class PaperController(CheckedLaw):
     def _make_setpoints(self) -> Setpoints:
         return analytic_setpoints(self.config)
 
+    def thrusts(self, measurement: Measurement, reference: Reference) -> np.ndarray:
+        """Thrusts of a tick before the thrust limits [N], (n,): the allocator brings them into the tick's window.
+
+        Args:
+            measurement: Checked measurement.
+            reference: Checked reference.
+        """
+        return analytic_thrusts(self.setpoints)
+
     def _command(self, measurement: Measurement, reference: Reference, rejected: tuple[str, ...]) -> Command:
         rejected += reach_note(self.setpoints, reference)
-        free = analytic_thrusts(self.setpoints)
+        free = self.thrusts(measurement, reference)
         return clipped_command(self.setpoints, measurement, reference, free, Outcome.SOLVED, rejected, allocate)

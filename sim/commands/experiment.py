@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import math
 import shlex
 import time
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from ibvs_qp.config.errors import ConfigError
 from sim.commands.options import (
     World,
     check_jobs,
@@ -24,6 +26,9 @@ from sim.commands.options import (
 )
 from sim.experiments import ALL, NAMES
 from sim.world.worlds import DEFAULT_WORLD
+
+#: Folder of the record that `--again` reads, unless --out names another.
+RECORD = Path("runs/record")
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,9 +43,11 @@ class ExperimentCommand:
     Example: ibvs-qp experiment force-hold --quick --out runs/force-hold
     """
 
-    name: Annotated[Literal[(*NAMES, ALL)], tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]  # type: ignore[valid-type]
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME|FILE.toml")]
     """Experiment: force-hold, paint, ablation, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate,
-    approach, payload, mismatch, worlds, rivals or all."""
+    approach, payload, rates, mismatch, worlds, rivals, all, or a spec of your own (docs/experiments.md)."""
+    again: Annotated[bool, flag] = False
+    """Compute every figure again from the traces in --out, without a flight; flights without a trace are flown."""
     quick: Annotated[bool, flag] = False
     """Few cells and seeds: takes minutes, does not replace the record."""
     features: Literal["rendered", "geometric"] = "rendered"
@@ -51,7 +58,7 @@ class ExperimentCommand:
     jobs: Annotated[int | None, optional("N")] = None
     """Parallel processes; default: one per core. The results do not depend on it."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Run folder; default: runs/<UTC stamp>. Finished flights in it are not flown again."""
+    """Run folder; default: runs/<UTC stamp>, with --again runs/record. Finished flights in it are not flown again."""
     traces: Annotated[bool, flag] = False
     """Keep the inputs of every flight's figures, about 20 kB per second of flight: others can be computed later."""
     plan: Annotated[bool, flag] = False
@@ -70,29 +77,40 @@ class ExperimentCommand:
         check_seed(self.seed)
         check_jobs(self.jobs)
         notes = Console(stderr=True, quiet=self.json)
-        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, traces=self.traces, world=self.world)
+        _check_name(self.name)
+        traces = self.traces or self.again
+        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, traces=traces, world=self.world)
         runs = designs(self.name, choice)
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:
             return 0
-        with RunFolder.open(self.out, resume=True) as folder:
+        with RunFolder.open(self.out or (RECORD if self.again else None), resume=True) as folder:
             return self._fly(runs, folder.path, words, started, notes)
 
     def _fly(self, runs: Sequence[Run], folder: Path, words: list[str], started: float, notes: Console) -> int:
         from importlib.metadata import version
 
+        import polars as pl
         from rich.console import Console
 
         from sim.experiments.design import chosen, worlds_of
-        from sim.experiments.record import PARTS, write_page, write_summary, write_tables
+        from sim.experiments.record import PARTS, flights_again, write_page, write_summary, write_tables
         from sim.experiments.record import summary as summarise
         from sim.flight.working import working
         from sim.report.rundir import as_json
         from sim.sweep import run_sweep
+        from sim.sweep.again import in_order
+        from sim.sweep.parts import HEAD
         from sim.sweep.progress import sweep_progress
 
-        with sweep_progress(notes, self.name) as progress:
-            result = run_sweep(runs, folder / PARTS, workers=self.jobs or usable_cores(), progress=progress)
+        title, workers = chosen(self.name)[0].name if self.name != ALL else ALL, self.jobs or usable_cores()
+        kept, missing = pl.DataFrame(schema=HEAD), runs
+        if self.again:
+            with working(notes, "Computing the figures ..."):
+                kept, missing = flights_again(folder, title, runs, workers)
+            notes.print(f"{kept.height} flights by their traces, {len(missing)} without one are flown", highlight=False)
+        with sweep_progress(notes, title) as progress:
+            result = run_sweep(missing, folder / PARTS, workers=workers, progress=progress)
         worlds = worlds_of(runs, self.world)
         facts: dict[str, Any] = {
             "command": command_line(words),
@@ -104,10 +122,10 @@ class ExperimentCommand:
             "interrupted": result.interrupted,
             "wall_time_s": time.perf_counter() - started,
         }
-        experiments, table = chosen(self.name), result.table
+        experiments, table = chosen(self.name), in_order(runs, (kept, result.table))
         with working(notes, "Comparing ..."):
-            write_tables(folder, self.name, experiments, table)
-            content = summarise(self.name, experiments, table, folder, facts)
+            write_tables(folder, title, experiments, table)
+            content = summarise(title, experiments, table, folder, facts)
         write_summary(folder, content)  # before the figures: an error there must not lose the record
         page = None
         if table.height and not result.interrupted:
@@ -118,7 +136,7 @@ class ExperimentCommand:
             )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with working(notes, "Drawing the figures ..."):
-                page = write_page(folder, experiments, table, lead, self._again(), self.name)
+                page = write_page(folder, experiments, table, lead, self._repeat(), title)
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:
@@ -133,13 +151,22 @@ class ExperimentCommand:
             return interrupted(words, folder, f"finished flights are in {folder}")
         return 0
 
-    def _again(self) -> str:
+    def _repeat(self) -> str:
         """The command that repeats an experiment on any computer, with ``{name}`` in place of its name."""
         words = ["ibvs-qp", "experiment", "NAME", *(["--quick"] if self.quick else [])]
         words += ["--features", self.features] if self.features != "rendered" else []
         words += ["--world", self.world] if self.world != DEFAULT_WORLD else []
         words += ["--seed", str(self.seed)] if self.seed else []
-        return shlex.join(words).replace("NAME", "{name}")
+        return shlex.join(words).replace("NAME", self.name if self.name.endswith(".toml") else "{name}")
+
+
+def _check_name(name: str) -> None:
+    """Refuse a name that is neither a shipped experiment nor a file."""
+    if name in (*NAMES, ALL) or name.endswith(".toml"):
+        return
+    near = difflib.get_close_matches(name, (*NAMES, ALL), n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"allowed are {', '.join((*NAMES, ALL))}, or a file.toml"
+    raise ConfigError(f"no experiment {name!r}; {hint}")
 
 
 def _print_plan(console: Console, runs: Sequence[Run]) -> None:

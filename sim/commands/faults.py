@@ -52,6 +52,8 @@ class Faults:
     """World: ideal, datasheet, harsh, or a TOML file; default: ideal and datasheet."""
     unsupervised: Annotated[bool, flag] = False
     """Only the flights without the supervisor."""
+    controller: Annotated[str | None, optional("MODULE:CLASS")] = None
+    """Control law of your own in place of the QP: module:Class or file.py:Class (docs/extending.md)."""
     seed: int = 0
     """First seed; the flights of a row use consecutive seeds."""
     jobs: Annotated[int | None, optional("N")] = None
@@ -89,6 +91,7 @@ class Faults:
             world=self.world,
             seed=self.seed,
             unsupervised=self.unsupervised,
+            controller=self.controller or "",
         )
         notes, runs = Console(stderr=True, quiet=self.json), design(choice)
         _print_plan(Console() if self.plan else notes, runs, workers)

@@ -56,8 +56,12 @@ class Paint:
     """Camera back end: plane needs no GL library; gl and auto draw with OpenGL if it works, else with plane."""
     strategy: Annotated[str | None, optional("MODULE:CLASS")] = None
     """Strategy of your own, a subclass of ibvs_qp.Strategy: module:Class or file.py:Class; default: paint the scene."""
+    controller: Annotated[str | None, optional("MODULE:CLASS")] = None
+    """Control law of your own, a subclass of ibvs_qp.PaperController or HybridController, on the preset of --law."""
+    rows: Annotated[tuple[str, ...], optional("MODULE:CLASS ...")] = ()
+    """Tasks and limits of your own that join the QP law, subclasses of ibvs_qp.tasks.Task and ibvs_qp.limits.Limit."""
     law: Literal["qp", "paper", "both"] = "both"
-    """Law to fly."""
+    """Law to fly; with --controller or --rows both is qp."""
     seed: int = 0
     """Varies start pose, textures, clutter, noise and biases; the same seed repeats the flight."""
     out: Annotated[Path | None, optional("DIR")] = None
@@ -104,6 +108,7 @@ class Paint:
         check_mujoco()
         from sim.flight.jobs import OwnJob
         from sim.flight.options import FlightOptions, pilot_config, sized
+        from sim.flight.own_law import check_own
         from sim.flight.preflight import check_job
         from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
@@ -139,18 +144,20 @@ class Paint:
             video=not self.no_video,
             compiled=True,
             view=self.view,
+            controller=self.controller or "",
+            rows=self.rows,
         )
         if vehicle is not None:
             for warning in require_vehicle(pilot_config(scene, options), f"--vehicle {self.vehicle}"):
                 print(f"ibvs-qp: {warning}", file=sys.stderr)
-        laws = ("qp", "paper") if self.law == "both" else (self.law,)
+        own = bool(self.controller or self.rows)
+        laws = ("qp", "paper")[: 2 - own] if self.law == "both" else (self.law,)
         job = OwnJob(name=self.strategy) if self.strategy is not None else None
         for law in laws:  # an unusable preset, job or strategy is refused before anything is shown or written
             flown = dataclasses.replace(options, law=law)
             config = pilot_config(scene, flown)
             check_job(sized(scene, flown), config, self.features, job)
-            if job is not None:
-                job.strategy(config.painting)
+            check_own(flown, config, job)
         notes = Console(stderr=True, quiet=self.json)
         facts = {
             "command": command_line(words),
@@ -162,7 +169,7 @@ class Paint:
             "image_size": list(size or (scene.camera.width, scene.camera.height)),
             "features": self.features,
             "vision": self.vision,
-        } | ({} if self.strategy is None else {"strategy": self.strategy})
+        } | {name: getattr(self, name) for name in ("strategy", "controller", "rows") if getattr(self, name)}
         with RunFolder.open(self.out, overwrite=self.overwrite) as folder:
             options = dataclasses.replace(options, journal=str(folder.journal), mcap=self.log == "mcap")
             with flight_progress(notes, scene, laws) as progress:
@@ -180,6 +187,7 @@ class Paint:
         from sim.flight.trace import INTERRUPTED
         from sim.flight.working import working
         from sim.report.rundir import as_json, peak_memory, summary
+        from sim.report.wording import own_classes
 
         traces = {law: flight.trace for law, flight in flights.items()}
         with working(notes, "Computing the figures of merit ..."):
@@ -204,7 +212,8 @@ class Paint:
             print(as_json(final))
         else:
             table = figure_table(metrics)
-            table.title = plain(f"Scene {facts['scene']}, world {facts['world']}, seed {facts['seed']}")
+            title = f"Scene {facts['scene']}, world {facts['world']}, seed {facts['seed']}{own_classes(facts)}"
+            table.title = plain(title)
             Console().print(table)
             if folder.report.exists():
                 print(f"Report: {folder.report}")

@@ -59,10 +59,8 @@ class Tune:
     """Vehicle to tune for: TOML with [vehicle], PX4 parameters, MJCF or URDF; it replaces the preset's."""
     jobs: int = 1
     """Trials of a generation that fly side by side."""
-    trials_of: Annotated[Path | None, optional("FILE")] = None
-    """Record of an earlier search (LAW_trials.json): choose again from its trials, without a search."""
     storage: Annotated[str | None, optional("FILE_OR_URL")] = None
-    """Journal file or database that several processes or computers may share; default: in --out."""
+    """Optuna's journal file or database: an earlier search, or one that computers share; default: in --out."""
     out: Annotated[Path | None, optional("DIR")] = None
     """Run folder; default: runs/<UTC stamp>."""
     json: Annotated[bool, flag] = False
@@ -81,14 +79,12 @@ class Tune:
             try:
                 summary = self._search(plan, folder, words, notes)
             except KeyboardInterrupt:
-                parts, trials = f"flights are in {folder / 'parts'}", f"finished trials are in {plan.storage}"
-                return interrupted(words, folder, parts if self.trials_of else trials)
+                return interrupted(words, folder, f"finished trials are in {plan.storage}")
         found = "Weights" if self.law == "mpc" else "Preset"
         print(as_json(summary) if self.json else f"Report: {summary['report']}\n{found}: {summary['preset']}")
         return 0
 
     def _check(self) -> None:
-        from ibvs_qp.config.errors import ConfigError
         from sim.tune.flights import SEED_STRIDE
 
         check_seed(self.seed)
@@ -97,12 +93,8 @@ class Tune:
         check_jobs(self.jobs)
         preset_file(self.preset)
         preset_file(self.vehicle, "--vehicle", other_formats=True)
-        check_readable("--trials-of", self.trials_of)
         if self.storage and "://" not in self.storage and os.path.lexists(self.storage):
             check_readable("--storage", Path(self.storage), LARGEST_JOURNAL)
-        for name in ("trials", "flights", "storage"):
-            if self.trials_of and getattr(self, name) != getattr(type(self)(), name):
-                raise ConfigError(f"--{name} configures a search, and --trials-of runs none; give one of them")
 
     def _plan(self, folder: Path) -> SearchPlan:
         from ibvs_qp.pilot import PilotConfig
@@ -134,8 +126,7 @@ class Tune:
         from sim.tune.finalists import best_of, fly_finalists, fly_unseen
         from sim.tune.record import Outcome, write
 
-        command = command_line(words)
-        trials, searched_by = self._trials(plan, command, notes)
+        trials = self._trials(plan, notes)
         parts = folder / "parts"
         with sweep_progress(notes, f"{self.law}: choice") as progress:
             finalists = fly_finalists(plan, trials, -(-self.unseen // 2), parts, progress)
@@ -148,32 +139,28 @@ class Tune:
             trials=trials,
             finalists=finalists,
             table=table,
-            command=command,
-            searched_by=searched_by,
+            command=command_line(words),
             again=self._again(),
         )
         with working(notes, "Drawing the report ..."):
             return write(outcome, folder)
 
-    def _trials(self, plan: SearchPlan, command: str, notes: Console) -> tuple[Trials, str]:
-        """Trials of a search or of a record, and the command of the search."""
+    def _trials(self, plan: SearchPlan, notes: Console) -> Trials:
+        """Trials of the search, those in its storage included."""
         from sim.sweep.progress import sweep_progress
         from sim.tune.search import finished, open_study, search
-        from sim.tune.stored import stored_trials
 
-        if self.trials_of:
-            return stored_trials(self.trials_of, plan)
         study = open_study(plan)
         before = len(finished(study))
         with sweep_progress(notes, f"{self.law}: trials") as progress:
             search(plan, study, lambda done: progress(done, plan.trials, before))
-        return finished(study), command
+        return finished(study)
 
     def _again(self) -> str:
         """The command that repeats the result on any computer."""
         default = type(self)()
-        words = ["ibvs-qp", "tune", "--law", self.law, *([] if self.trials_of else ["--trials", str(self.trials)])]
-        for name in ("seed", "flights", "unseen", "features", "preset", "vehicle", "trials_of", "jobs"):
+        words = ["ibvs-qp", "tune", "--law", self.law, "--trials", str(self.trials)]
+        for name in ("seed", "flights", "unseen", "features", "preset", "vehicle", "jobs"):
             if getattr(self, name) != getattr(default, name):
                 words += [f"--{name.replace('_', '-')}", str(getattr(self, name))]
         return shlex.join(words)

@@ -17,8 +17,9 @@ from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.faults.air import WindStep
 from sim.faults.fault import Fault
 from sim.faults.rotors import Derate
-from sim.flight.jobs import PaintJob, PressJob
+from sim.flight.jobs import OwnJob, PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
+from sim.flight.own_law import check_own
 from sim.flight.preflight import check_job
 from sim.sweep.design import FlightPlan, Parameter, Run
 from sim.sweep.setup import Setup, changed
@@ -60,7 +61,7 @@ def designs(name: str, choice: Choice) -> list[Run]:
 def design(experiment: Experiment, choice: Choice) -> list[Run]:
     """Runs of an experiment, in the order of its file: flights, levels, laws, seeds."""
     runs = []
-    for flights in experiment.quick if choice.quick else experiment.flights:
+    for flights in (choice.quick and experiment.quick) or experiment.flights:
         if flights.rendered_only and choice.features != "rendered":
             continue
         for values in itertools.product(*flights.levels.values()):
@@ -74,11 +75,12 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
     for law in flights.laws or VARIANTS[variant].laws:
         options = FlightOptions(
             law=law,
-            rival=VARIANTS[variant].rival,
+            controller=VARIANTS[variant].controller,
+            rows=VARIANTS[variant].rows,
             features=flights.features or choice.features,
             vision=VARIANTS[variant].vision,
             video=False,
-            compiled=choice.compiled and not VARIANTS[variant].rival,
+            compiled=choice.compiled and not VARIANTS[variant].controller,
         )
         prepared = functools.partial(_prepared, experiment, flights, level, options, variant, choice.world)
         shared = None if flights.scene == "random" else prepared(choice.seed)
@@ -116,6 +118,7 @@ def _prepared(
     setup = _setup(experiment, flights, level, options.law, variant, scene)
     config = pilot_config(setup.scene, options, setup.pilot)
     check_job(setup.scene, config, options.features, setup.job)
+    check_own(options, config, setup.job)
     return setup, config
 
 
@@ -152,6 +155,8 @@ def _setup(
     if FORCE_GAIN in level:
         pilot = with_force_gain(pilot, float(level[FORCE_GAIN]))
     job = PaintJob() if flights.measure.startswith("paint") else PressJob()
+    if flights.strategy:
+        job = OwnJob(name=flights.strategy)
     return changed(Setup(scene=scene, pilot=pilot, job=job), values)
 
 

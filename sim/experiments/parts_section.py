@@ -54,7 +54,7 @@ def parts_section(flown: Flown) -> str:
 def rivals_section(flown: Flown) -> str:
     """Other formulations in place of the QP: counts of outcomes, then every figure that differs by enough."""
     text, rows = "", []
-    for rival, own in grouped(_entries(flown, lambda name: bool(VARIANTS[name].rival)), _variant).items():
+    for rival, own in grouped(_entries(flown, lambda name: bool(VARIANTS[name].controller)), _variant).items():
         count = Counter[Effect]()
         for experiment, columns, entry in own:
             for column in columns:
@@ -82,7 +82,7 @@ def _variant(entry: tuple[Experiment, Sequence[Column], dict[str, Any]]) -> str:
 
 
 def _is_part(name: str) -> bool:
-    return "allocator" not in VARIANTS[name].switches and name != DIRECT and not VARIANTS[name].rival
+    return "allocator" not in VARIANTS[name].switches and name != DIRECT and not VARIANTS[name].controller
 
 
 def _entries(flown: Flown, chosen: Callable[[str], bool]) -> list[tuple[Experiment, Sequence[Column], dict[str, Any]]]:

@@ -18,9 +18,12 @@ from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
+from sim.sweep.again import score_again
+from sim.sweep.design import Run
 from sim.sweep.paired import paired_differences, variant_differences
 from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells, false_claims
+from sim.sweep.tables import read_tables
 
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.
@@ -104,6 +107,12 @@ def write_tables(folder: Path, name: str, experiments: Sequence[Experiment], tab
     write_table(data_file(folder, name), table)
     for experiment in experiments if name == ALL else ():
         write_table(data_file(folder, experiment.name), rows_of(table, experiment))
+
+
+def flights_again(folder: Path, name: str, runs: Sequence[Run], workers: int) -> tuple[pl.DataFrame, list[Run]]:
+    """Rows by the traces of a folder, and the runs without a trace (`sim.sweep.again`)."""
+    file = data_file(folder, name)
+    return score_again(runs, read_tables([file] if file.exists() else []), folder / PARTS, workers)
 
 
 def write_summary(folder: Path, content: dict[str, Any]) -> None:

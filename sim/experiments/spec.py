@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, load_toml, setting, validate
 from sim.evaluate.figures import figure_of
+from sim.experiments import ALL, NAMES
 from sim.experiments.criteria import Criteria, Criterion
+from sim.experiments.variants import REFERENCES, VARIANTS, Variant
 from sim.sweep.design import Parameter
 
 SPECS = Path(__file__).with_name("specs")
@@ -22,6 +26,10 @@ Value = int | float | bool | str | tuple[float, ...]
 
 #: Of a column: as for its figure.
 OF_FIGURE = 99
+
+
+#: Experiments of the user's by name, once they are loaded.
+_own: dict[str, Experiment] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +74,7 @@ class Flights:
     seeds: int = setting(1, "flights of each cell and law", low=1)
     levels: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)  # first slowest; also variant, world
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths, as in ibvs-qp sweep
+    strategy: str = ""  # class of a strategy of the user's that replaces the job of the measure
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # further paths that take a parameter's value
     laws: tuple[str, ...] = ()  # laws of the flights; empty means those of the variant
     scene: str = choice("default", "scene; random is one per seed, the same under every law", ("default", "random"))
@@ -129,18 +138,19 @@ class Experiment:
     name: str  # as on the command line
     title: str  # heading of its section
     about: str  # flights and measurements
-    published: str  # figures of the paper, or of other publications
     params: dict[str, str]  # parameters of its cells and their headings
     columns: tuple[Column, ...]
-    criteria: tuple[Criteria, ...]
     flights: tuple[Flights, ...]  # of the record
-    quick: tuple[Flights, ...]  # of --quick
+    published: str = "–"  # figures of the paper, or of other publications
+    criteria: tuple[Criteria, ...] = ()
+    quick: tuple[Flights, ...] = ()  # of --quick; without any it flies all
     figures: tuple[FigureSpec, ...] = ()
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # dotted paths that take a parameter's value
     named: dict[str, dict[str, dict[str, Value]]] = field(default_factory=dict)  # paths set by a parameter's value
     fixed: dict[str, Value] = field(default_factory=dict)  # values of dotted paths for all flights
     world: str = ""  # of flights without a level `world`; empty takes that of the command line
     folded: dict[str, Parameter] = field(default_factory=dict)  # cells that the page folds away: a figure shows them
+    variants: dict[str, Variant] = field(default_factory=dict)  # of its own, beside those of variants.toml
 
     def every_criterion(self) -> list[Criterion]:
         """The criteria one by one."""
@@ -153,9 +163,21 @@ class Experiment:
 
 @functools.cache
 def experiment(name: str) -> Experiment:
-    """The experiment of a name.
+    """The experiment of a name, or of a spec of the user's (a TOML file), which then has its own name as well.
 
     Raises:
-        ConfigError: When its file is missing or refused.
+        ConfigError: When its file is missing or refused, or it redefines a shipped name.
     """
-    return load_toml(Experiment, SPECS / f"{name}.toml")
+    if name in _own:
+        return _own[name]
+    if not name.endswith(".toml"):
+        return load_toml(Experiment, SPECS / f"{name}.toml")
+    found = load_toml(Experiment, Path(name))
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", found.name) or found.name in (*NAMES, ALL):
+        raise out_of_range("name", found.name, "", "allowed are letters, digits, - and _, and no name of a shipped one")
+    for variant, own in found.variants.items():
+        if VARIANTS.get(variant, own) != own:
+            raise out_of_range("variants", variant, "", "a shipped variant has this name")
+        VARIANTS[variant], REFERENCES[variant] = own, own.against
+    _own[found.name] = found
+    return found

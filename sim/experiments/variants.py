@@ -26,7 +26,8 @@ class Variant:
     gains: dict[str, float] = field(default_factory=dict)  # gains that differ
     gains_of: str = ""  # law whose shipped gains it flies; empty for its own
     gyro_rate: bool = False  # whether rotation is damped on the gyro itself
-    rival: str = ""  # control law of sim.rivals that flies instead of the law, as in FlightOptions
+    controller: str = ""  # class of a control law in place of the law, as in FlightOptions
+    rows: tuple[str, ...] = ()  # classes of further tasks and limits, as in FlightOptions
     vision: str = "own"  # perception of rendered pictures, as in FlightOptions
     laws: tuple[str, ...] = ("qp", "paper")  # laws that it applies to
     against: tuple[str, ...] = ("standard",)  # reference variants: the first that flew the same cell

@@ -13,6 +13,7 @@ from sim.evaluate.measures import fault_figures
 from sim.experiments.scenes import short_job
 from sim.faults.scenario import WATCH_S, Scenario, scenarios
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
+from sim.flight.own_law import check_own
 from sim.sweep.design import FlightPlan, Run
 from sim.world.scene import Scene
 from sim.world.worlds import in_world
@@ -41,6 +42,7 @@ class Choice:
     world: str | None = None  # name or file; None flies `WORLDS`
     seed: int = 0  # first seed
     unsupervised: bool = False  # only the flights without the supervisor
+    controller: str = ""  # control law of the user's instead of the QP, as in `FlightOptions`
 
     def __post_init__(self) -> None:
         """Refuse a design without flights."""
@@ -86,6 +88,7 @@ def design(choice: Choice) -> list[Run]:
     Raises:
         ConfigError: When a row cannot be flown.
     """
+    check_own(FlightOptions(controller=choice.controller), pilot_of(SUPERVISED), None)
     return [run for row in choice.rows for place in row.places for run in _flights(row, place, choice)]
 
 
@@ -94,7 +97,7 @@ def _flights(row: Scenario, place: str, choice: Choice) -> Iterator[Run]:
         scene = job_scene(world)
         for variant in (SUPERVISED, CONTROL):
             for seed in choice.flights(variant):
-                options = FlightOptions(seed=seed, features="geometric", video=False)
+                options = FlightOptions(seed=seed, features="geometric", video=False, controller=choice.controller)
                 config = pilot_config(scene, options, pilot_of(variant))
                 rotors = config.controller.vehicle.geometry.names
                 faults = row.flown(place, seed, rotors)

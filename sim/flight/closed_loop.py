@@ -13,10 +13,10 @@ from sim.faults.fault import Fault
 from sim.faults.schedule import FaultSchedule
 from sim.flight.jobs import Job, OwnJob, PaintJob
 from sim.flight.options import FlightOptions, pilot_config, ticks_in
+from sim.flight.own_law import own_law
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
 from sim.flight.trace import CRASH, INTERRUPTED, LANDED, Event, Trace
-from sim.rivals import rival_controller
 from sim.sensors.features import add_sigma_vs
 from sim.world.board import BoardGeometry
 from sim.world.random_streams import stream
@@ -37,13 +37,11 @@ BASE_TIME, STROKE_FACTOR = 90.0, 8.0
 
 
 def make_pilot(scene: Scene, options: FlightOptions, config: PilotConfig, job: Job) -> Pilot:
-    """The pilot of one flight; the scene's extra feature noise follows its perception, and a rival replaces its law."""
+    """The pilot of one flight; the scene's extra feature noise follows its perception."""
     sigma, noise = scene.features.sigma_vs, stream(options.seed, "sigma_vs")
     rendered = options.features == "rendered"  # the sensor model of lines adds the same noise itself
     seen_as = (lambda frame: add_sigma_vs(frame, sigma, noise)) if rendered and sigma > 0.0 else None
-    law = straightened(config.controller)
-    controller = rival_controller(options.rival, law, options.rival_settings) if options.rival else None
-    pilot = Pilot(config, job.strategy(config.painting), seen_as, controller)
+    pilot = Pilot(config, job.strategy(config.painting), seen_as, own_law(options, straightened(config.controller)))
     if rendered:
         pilot.prepare()
     return pilot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import ibvs_qp
 from ibvs_qp.config import VehicleParams
@@ -17,9 +17,6 @@ from sim.vehicles.vehicle_file import read_vehicle
 from sim.world.board import BoardGeometry
 from sim.world.mjcf import STEP_NS
 from sim.world.scene import Scene
-
-if TYPE_CHECKING:
-    from sim.rivals.horizon import MpcSettings
 
 #: Most physics steps in a control tick: 100 Hz, at which the lag of a tick already costs half the margin.
 MOST_STEPS = 10
@@ -35,15 +32,17 @@ SLACK_M = 5e-3
 class FlightOptions:
     """How to fly a scene; the defaults are the main job.
 
-    With `compiled` the controller runs as C code if there is a compiler: a bit-identical flight, faster. A
-    `rival` is a control law of `sim.rivals`, flown on the law's preset instead of the law itself, the predictive one
-    with `rival_settings` if there are any. With a `journal` the rows of the log are written to that folder while the
-    flight goes on, with `mcap` an MCAP log, too.
+    With `compiled` the controller runs as C code if there is a compiler: a bit-identical flight, faster. A `controller`
+    is a class of a control law, ``module:Class`` or ``file.py:Class``, constructed with the law's `ControllerConfig`
+    (and `controller_settings`, if there are any) and flown instead of the law. `rows` are classes of further tasks and
+    limits of the QP law. With a `journal` the rows of the log are written to that folder while the flight goes on, with
+    `mcap` an MCAP log, too.
     """
 
     law: str = "qp"
-    rival: str = ""
-    rival_settings: MpcSettings | None = None
+    controller: str = ""
+    controller_settings: Any = None
+    rows: tuple[str, ...] = ()
     seed: int = 0
     features: str = "rendered"
     vision: str = "own"

@@ -1,9 +1,10 @@
-"""Classes of the user's, named on the command line as ``module:Class`` or ``file.py:Class``."""
+"""Classes named as ``module:Class`` or ``file.py:Class`` in options and specs: strategies, laws, tasks and limits."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -17,12 +18,12 @@ Own = TypeVar("Own")
 LONGEST = 200
 
 
-def built(name: str, base: type[Own], option: str, *arguments: Any) -> Own:
+def built(name: str, base: type[Own] | tuple[type[Own], ...], option: str, *arguments: Any) -> Own:
     """An instance of a class of the user's.
 
     Args:
         name: ``module:Class``, imported as Python does and from the current folder, or ``file.py:Class``.
-        base: Required base class.
+        base: Required base class, or several of which one is required.
         option: Option that names it, for messages.
         arguments: Of its constructor.
 
@@ -36,11 +37,17 @@ def built(name: str, base: type[Own], option: str, *arguments: Any) -> Own:
     if not isinstance(own, type):
         raise ConfigError(f"{option} {name}: {place} has no class {word}")
     if not issubclass(own, base):
-        raise ConfigError(f"{option} {name}: {word} is no subclass of ibvs_qp.{base.__name__}")
+        bases = " or ".join(f"ibvs_qp.{each.__name__}" for each in (base if isinstance(base, tuple) else (base,)))
+        raise ConfigError(f"{option} {name}: {word} is no subclass of {bases}")
     try:
         return own(*arguments)
     except (Exception, SystemExit) as error:  # of the user's code
         raise ConfigError(f"{option} {name}: {word}(...) raises {_described(error)}") from error
+
+
+def source_of(name: str) -> str:
+    """Source code of the module of a class, for hashes."""
+    return inspect.getsource(_module(name.rpartition(":")[0], name))
 
 
 def _module(place: str, given: str) -> ModuleType:

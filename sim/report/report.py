@@ -14,7 +14,7 @@ from typing import Any
 from sim.evaluate.flight_table import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace, law_name
-from sim.report.wording import OUTCOMES, limit_words
+from sim.report.wording import OUTCOMES, limit_words, own_classes
 from sim.storage.atomic import write_text
 from sim.video.film import still
 
@@ -47,7 +47,7 @@ def write_report(
         f"Scene <b>{escape(summary['scene'])}</b>, world <b>{escape(summary['world'])}</b>, seed {summary['seed']}, "
         f"{escape(summary['features'])} features, "
         f"camera {escape(summary['camera'])} {summary['image_size'][0]}×{summary['image_size'][1]}, "
-        f"{summary['wall_time_s']:.0f} s on this computer."
+        f"{summary['wall_time_s']:.0f} s on this computer{escape(own_classes(summary))}."
     )
     interrupted = '<p class="warning">Interrupted: this report covers the flight until then.</p>'
     page = Template(_PAGE.read_text(encoding="utf-8")).substitute(

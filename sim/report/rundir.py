@@ -171,7 +171,7 @@ def summary(
     """Content of summary.json.
 
     Args:
-        facts: command, seed, scene, world, preset, camera, image_size, features, vision; strategy if it is the user's.
+        facts: command, seed, scene, world, preset, camera, image_size, features, vision; classes of the user's.
         folder: The run folder.
         metrics: M of every law flown.
         interrupted: Whether Ctrl-C ended the run.
@@ -185,7 +185,7 @@ def summary(
         **{key: facts[key] for key in ("seed", "scene", "world", "preset")},
         "run_dir": str(folder.path),
         **{key: facts[key] for key in ("camera", "image_size", "features", "vision")},
-        **{key: facts[key] for key in ("strategy",) if key in facts},
+        **{key: facts[key] for key in ("strategy", "controller", "rows") if key in facts},
         "interrupted": interrupted,
         "wall_time_s": wall_time_s,
         "peak_memory_bytes": peak_memory_bytes,

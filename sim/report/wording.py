@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 #: Meaning of every outcome of a control tick.
 OUTCOMES = {
     "solved": "The solver reached its accuracy: the normal case.",
@@ -25,3 +27,10 @@ LIMITS = {
 def limit_words(name: str) -> str:
     """Meaning of a limit; empty for one of a user's own."""
     return next((words for start, words in LIMITS.items() if name.startswith(start)), "")
+
+
+def own_classes(summary: dict[str, Any]) -> str:
+    """Classes of the user's that flew, for titles: the law's name then is that of its preset; empty without any."""
+    words = {"controller": "control law", "rows": "tasks and limits", "strategy": "strategy"}
+    found = ((name, summary.get(key)) for key, name in words.items())
+    return "".join(f", {name} {' '.join([own] if isinstance(own, str) else own)}" for name, own in found if own)

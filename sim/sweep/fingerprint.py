@@ -14,6 +14,7 @@ import allocation
 import ibvs_qp
 import sim
 from ibvs_qp.config.settings import to_dict
+from sim.flight.own_class import source_of
 from sim.sweep.design import Block, Run
 
 #: Folders of `sim` that only describe or draw results: a change there needs no new flight.
@@ -42,9 +43,15 @@ def configuration_hash(run: Run) -> str:
             "config": to_dict(plan.config),
             "options": options,
             "job": repr(plan.job),
+            "own": own_sources((plan.options.controller, getattr(plan.job, "name", ""), *plan.options.rows)),
             "faults": [repr(fault) for fault in plan.faults],
         }
     )
+
+
+def own_sources(names: Sequence[str]) -> list[str]:
+    """Source code of classes of the user's, ``module:Class`` or ``file.py:Class``; empty names are left out."""
+    return [source_of(name) for name in names if name]
 
 
 @functools.cache

@@ -94,8 +94,12 @@ def fly_run(run: Run | Refusal, log: Path | None = None) -> Row:
     if run.trace and log is not None:
         save_trace(file := log.parent / f"{log.name}{TRACE}", trace)
         row["trace"] = f"{file.parent.name}/{file.name}"
-    figures = run.measure(trace)
-    return row | {key: None if math.isnan(value) else float(value) for key, value in figures.items()}
+    return row | figures_of(run, trace)
+
+
+def figures_of(run: Run, trace: Trace) -> Row:
+    """Every figure that the run measures; None without data."""
+    return {key: None if math.isnan(value) else float(value) for key, value in run.measure(trace).items()}
 
 
 def outcome(trace: Trace) -> Row:

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import to_dict
 from sim.evaluate.measures import paint_figures, press_row
-from sim.flight.jobs import PaintJob
+from sim.flight.jobs import PressJob
 from sim.flight.options import pilot_config
 from sim.flight.preflight import check_job
 from sim.sweep.axes import fractions
 from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run
-from sim.sweep.fingerprint import code_hash, digest
+from sim.sweep.fingerprint import code_hash, digest, own_sources
 from sim.sweep.setup import changed
 from sim.sweep.spec import SweepSpec, options_of
 from sim.world.board import BoardGeometry
@@ -49,8 +49,10 @@ class Planned:
         return digest(
             {
                 "setups": {law: [to_dict(s.scene), to_dict(s.pilot), repr(s.job)] for law, s in spec.setups.items()},
-                "options": [spec.settings.features, spec.settings.vision],
+                "options": [spec.settings.features, spec.settings.vision, spec.settings.controller, spec.settings.rows],
+                "own": own_sources((spec.settings.controller, spec.settings.strategy, *spec.settings.rows)),
                 "name": spec.settings.name,
+                "tied": spec.tied,
                 "traces": spec.settings.traces,
                 "code": code_hash(),
             }
@@ -86,14 +88,14 @@ class Planned:
         law, seed, params = self.place(index)
         facts = {"experiment": self.spec.settings.name, "variant": "standard", "params": params}
         try:
-            setup = changed(self.spec.setups[law], params)
+            setup = changed(self.spec.setups[law], self.spec.values(params))
             options = options_of(self.spec.settings, law, seed)
             config = pilot_config(setup.scene, options, setup.pilot)
             check_job(setup.scene, config, options.features, setup.job)
         except ConfigError as error:
             return Refusal(**facts, law=law, seed=seed, reason=str(error))
         plan = FlightPlan(scene=setup.scene, config=config, options=options, job=setup.job)
-        measure = paint_figures if isinstance(setup.job, PaintJob) else press_row
+        measure = press_row if isinstance(setup.job, PressJob) else paint_figures
         expected_s = OVERHEAD_S + setup.job.expected_s(config.painting, BoardGeometry(setup.scene).strokes)
         return Run(**facts, plan=plan, measure=measure, trace=self.spec.settings.traces, expected_s=expected_s)
 

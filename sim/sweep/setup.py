@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.jobs import PaintJob, PressJob
+from sim.flight.jobs import OwnJob, PaintJob, PressJob
 from sim.world.scene import Scene
 
 #: Sections of a setup, the first parts of a dotted path.
@@ -24,7 +24,7 @@ class Setup:
 
     scene: Scene = field(default_factory=Scene)  # the truth
     pilot: PilotConfig = field(default_factory=PilotConfig)  # perception, controller, strategy
-    job: PaintJob | PressJob = field(default_factory=PaintJob)  # task at the wall
+    job: PaintJob | PressJob | OwnJob = field(default_factory=PaintJob)  # task at the wall
 
 
 AnySetup = TypeVar("AnySetup", bound=Setup)

@@ -6,7 +6,8 @@ import dataclasses
 import itertools
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.config.files import read_toml
 from ibvs_qp.config.settings import choice, from_dict, setting, validate
 from ibvs_qp.pilot import PilotConfig
-from sim.flight.jobs import PaintJob, PressJob
+from sim.flight.jobs import OwnJob, PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config
+from sim.flight.own_law import check_own
 from sim.sweep.axes import Axis, make_axis
 from sim.sweep.setup import Setup, changed, value_at
 from sim.world.worlds import scene_in_world
@@ -24,7 +26,7 @@ from sim.world.worlds import scene_in_world
 LAWS = ("qp", "paper")
 JOBS = {"paint": PaintJob, "press": PressJob}
 #: Sections of a spec with dotted paths.
-SECTIONS = ("fixed", "grid", "random")
+SECTIONS = ("fixed", "grid", "random", "tied")
 #: Most flights of a sweep [-]: a table of 43 columns then has `sim.storage.limits.MOST_CELLS`, the most that are read.
 MOST_FLIGHTS = 10_000_000
 
@@ -37,6 +39,9 @@ class SweepSettings:
     about: str = setting("", "question of the sweep, in a sentence")
     job: str = choice("press", "press and slide, or paint", tuple(JOBS))
     laws: tuple[str, ...] = ("qp",)  # every point flies under each law, with the same seeds
+    strategy: str = setting("", "strategy of your own instead of the job, module:Class or file.py:Class")
+    controller: str = setting("", "control law of your own instead of the laws; each law's preset configures it")
+    rows: tuple[str, ...] = ()  # tasks and limits of your own, module:Class or file.py:Class; they join the QP law
     features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
     vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
     scene: str = setting("", "scene file, in the folder of the spec; empty is the default scene")
@@ -68,12 +73,17 @@ class SweepSpec:
     setups: dict[str, Setup]  # start values of every law, [fixed] included
     grid: tuple[Axis, ...]  # axes of the grid; every combination flies
     random: tuple[Axis, ...]  # drawn axes; every draw flies at every point of the grid
+    tied: dict[str, str] = field(default_factory=dict)  # further paths, and the varied one whose value each takes
 
     @property
     def flights(self) -> int:
         """Number of flights."""
         points, settings = math.prod(len(axis.values) for axis in self.grid), self.settings
         return max(1, settings.samples) * points * len(settings.laws) * settings.seeds
+
+    def values(self, varied: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of all paths from those of the varied ones."""
+        return {**varied, **{path: varied[leader] for path, leader in self.tied.items() if leader in varied}}
 
 
 def load_spec(file: Path) -> SweepSpec:
@@ -108,13 +118,17 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
     for law, file in (("qp", settings.preset_qp), ("paper", settings.preset_paper)):
         if law in settings.laws:
             pilot = PilotConfig.from_toml(folder / file) if file else ibvs_qp.preset(law)
-            setups[law] = changed(Setup(scene=scene, pilot=pilot, job=JOBS[settings.job]()), sections["fixed"])
+            job = OwnJob(name=settings.strategy) if settings.strategy else JOBS[settings.job]()
+            setups[law] = changed(Setup(scene=scene, pilot=pilot, job=job), sections["fixed"])
     first = setups[settings.laws[0]]
     grid, random = (
         tuple(make_axis(name, path, given, value_at(first, path)) for path, given in sections[name].items())
         for name in ("grid", "random")
     )
-    spec = SweepSpec(settings=settings, world=world, setups=setups, grid=grid, random=random)
+    spec = SweepSpec(settings=settings, world=world, setups=setups, grid=grid, random=random, tied=sections["tied"])
+    for path, leader in spec.tied.items():
+        if leader not in (varied := [axis.path for axis in (*grid, *random)]):
+            raise out_of_range(f"[tied] {path}", leader, "", f"allowed are the varied paths {', '.join(varied)}")
     if spec.flights > MOST_FLIGHTS:
         allowed = f"at most {MOST_FLIGHTS} are flown"
         raise out_of_range("samples x grid x laws x seeds", spec.flights, "flights", allowed)
@@ -124,14 +138,15 @@ def parse_spec(table: dict[str, Any], folder: Path) -> SweepSpec:
 
 def options_of(settings: SweepSettings, law: str, seed: int) -> FlightOptions:
     """Options of a flight of the spec."""
-    return FlightOptions(law=law, seed=seed, features=settings.features, vision=settings.vision, video=False)
+    own = {"controller": settings.controller, "rows": settings.rows}
+    return FlightOptions(law=law, seed=seed, features=settings.features, vision=settings.vision, video=False, **own)
 
 
 def _section(table: dict[str, Any], name: str) -> dict[str, Any]:
     given = table.get(name, {})
     if not isinstance(given, dict):
         raise ConfigError(f"{name} must be a table of dotted paths, got {given!r}")
-    return flat(given, name == "fixed")
+    return flat(given, name in ("fixed", "tied"))
 
 
 def flat(table: dict[str, Any], fixed: bool, prefix: str = "") -> dict[str, Any]:
@@ -151,12 +166,15 @@ def _check_values(spec: SweepSpec, fixed: dict[str, Any]) -> None:
     varied |= {axis.path: axis.ends for axis in (*spec.grid, *spec.random)}
     for law, setup in spec.setups.items():
         options = options_of(spec.settings, law, spec.settings.seed)
+        check_own(options, setup.pilot, setup.job)
         for path, values in varied.items():
             for value in values:
-                given = changed(setup, {path: value})
+                values_of = spec.values({path: value})
+                given = changed(setup, values_of)
                 flown = dataclasses.replace(given, pilot=pilot_config(given.scene, options, given.pilot))
-                if path.startswith("pilot.") and value_at(flown, path) != value_at(given, path):
+                pilots = (each for each in values_of if each.startswith("pilot."))
+                if fixed_path := next((p for p in pilots if value_at(flown, p) != value_at(given, p)), ""):
                     raise ConfigError(
-                        f"{path} cannot be set here: scene.paint, laws and vision determine it; "
+                        f"{fixed_path} cannot be set here: scene.paint, laws and vision determine it; "
                         "the pilot takes its paint job, for example, from the scene"
                     )

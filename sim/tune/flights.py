@@ -18,9 +18,10 @@ from sim.evaluate.measures import paint_figures, slide_figures
 from sim.experiments.preset_flights import paint_runs
 from sim.experiments.scenes import NEAR_START_M, changed
 from sim.flight.jobs import Job, PaintJob, PressJob
+from sim.rivals import MPC
 from sim.sweep.design import Run
 from sim.tune.objectives import PAINT, SATURATED, SLIDE, TASK
-from sim.tune.space import RIVAL, Subject
+from sim.tune.space import Subject
 from sim.vehicles.configuration import with_camera
 from sim.world.random_scene import TUNING, random_scene
 from sim.world.scene import Scene
@@ -144,7 +145,7 @@ def flights(
         seeds: Seeds.
         features: "geometric" or "rendered".
     """
-    rival = {"rival": RIVAL, "rival_settings": subject.weights} if subject.rival else {}
+    rival = {"controller": MPC, "controller_settings": subject.weights} if subject.rival else {}
     return [
         run
         for place, (name, each) in enumerate(flown.items())

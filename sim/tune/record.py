@@ -21,7 +21,6 @@ from sim.tune.figures import draw_front, draw_unseen
 from sim.tune.finalists import SHIPPED, Finalist, best_of, shipped_score
 from sim.tune.objectives import OBJECTIVES, Score
 from sim.tune.search import SearchPlan, Trials
-from sim.tune.stored import objective_columns, trial_rows
 from sim.tune.verdict import differences, objection
 
 
@@ -34,7 +33,6 @@ class Outcome:
     finalists: dict[str, Finalist]  # finalists and the shipped preset by name
     table: pl.DataFrame | None  # flights of shipped and chosen on unseen seeds; None without a chosen trial
     command: str  # the command line
-    searched_by: str  # the command line of the search that made the trials
     again: str  # the command that repeats it on any computer
 
     @property
@@ -64,7 +62,6 @@ def content(outcome: Outcome, folder: Path) -> dict[str, Any]:
     return {
         "schema": 1,
         "command": outcome.command,
-        "searched_by": outcome.searched_by,
         "law": outcome.law,
         "seed": outcome.plan.seed,
         "features": outcome.plan.features,
@@ -94,8 +91,7 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
         head = "# As shipped: no trial of the search may replace it."
     preset = outcome.plan.subject.having(gains).to_toml()
     write_text(folder / f"{law}.toml", f"{head}\n{preset}")
-    record = {**summary, "ranges": outcome.plan.subject.spans, "all_trials": trial_rows(outcome.trials)}
-    write_json(folder / f"{law}_trials.json", record)
+    write_json(folder / f"{law}.json", {**summary, "ranges": outcome.plan.subject.spans})
     with styled():
         shipped = shipped_score(outcome.plan, outcome.trials)
         save(draw_front(law, found, shipped, outcome.chosen), folder / "figures" / f"{law}-front.png")
@@ -104,6 +100,11 @@ def write(outcome: Outcome, folder: Path) -> dict[str, Any]:
             save(draw_unseen(law, outcome.table), folder / "figures" / f"{law}-unseen.png")
     write_text(folder / f"report_{law}.md", "\n".join(_page(outcome, summary)) + "\n")
     return summary
+
+
+def objective_columns(score: Score) -> dict[str, float]:
+    """Values of a score by column."""
+    return dict(zip((each.name for each in OBJECTIVES), score.values, strict=True)) | {"failed": score.failed}
 
 
 def _finalist(each: Finalist) -> dict[str, Any]:

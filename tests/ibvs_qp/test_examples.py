@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ibvs_qp import ControllerConfig, Reference
+from ibvs_qp import ControllerConfig, Measurement, PaperController, Reference
 from ibvs_qp.controller import HybridController
 
 ROOT = Path(__file__).parents[2]
@@ -195,3 +195,18 @@ def test_the_bag_shows_the_board() -> None:
     distance, edges = re.findall(r"tip ([\d.]+) m from the board, (\d) of its edges seen", text)[0]
     assert float(distance) == pytest.approx(0.4, abs=0.002) and edges == "2"
     assert "survey: guide" in text and "'solved': 2" in text
+
+
+def test_own_controller_adds_a_policy_to_the_analytic_law(tmp_path: Path) -> None:
+    level = [float(number) for number in NUMBER.findall(printed("own_controller"))]
+    example = runpy.run_path(str(ROOT / "examples" / "own_controller.py"))
+    assert len((ROOT / "examples" / "own_controller.py").read_text(encoding="utf-8").splitlines()) <= 40
+    rng = np.random.default_rng(0)
+    np.savez(tmp_path / "policy.npz", hidden=rng.normal(size=(32, 10)), output=rng.normal(size=(6, 32)))
+    law = example["ResidualPolicy"](ControllerConfig(), tmp_path / "policy.npz")
+    still = {"angular_velocity": np.array([0.1, 0.0, 0.0]), "contact_wrench": np.zeros(6)}
+    hover = Measurement(stamp_ns=4_000_000, wrench_stamp_ns=4_000_000, attitude=np.array([1.0, 0.0, 0.0, 0.0]), **still)
+    learned = law.step(hover, Reference()).thrusts
+    analytic = PaperController(ControllerConfig()).step(hover, Reference()).thrusts
+    assert len(level) == 6 and len(set(level)) == 1 and 8.0 < level[0] < 14.0
+    assert 0.0 < np.abs(learned - analytic).max() <= example["SHARE_N"]

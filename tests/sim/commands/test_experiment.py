@@ -105,6 +105,32 @@ def test_refusals_are_one_line(flown, capsys, words, named):
     assert not flown
 
 
+def same(one, other):
+    """Whether two summaries have the same cells; traces hold signals in single precision."""
+    for a, b in zip(one["cells"], other["cells"], strict=True):
+        assert (a["law"], a["params"], a["n"], a["completed"]) == (b["law"], b["params"], b["n"], b["completed"])
+        for name, figure in a["metrics"].items():
+            assert b["metrics"][name] == pytest.approx(figure, rel=1e-5, abs=1e-6), name
+    return True
+
+
+def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path, capsys):
+    words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
+    monkeypatch.setattr("sim.sweep.again.outcome", sim.sweep.flying.outcome)
+    main([*words, "--traces"])
+    count, content = len(flown), json.loads(capsys.readouterr().out)
+    main([*words, "--again"])
+    assert len(flown) == count > 1 and same(content, json.loads(capsys.readouterr().out))
+    next((tmp_path / "run" / "parts" / "logs").glob("*.trace.npz")).unlink()
+    for part in (tmp_path / "run" / "parts").glob("*.parquet"):  # of another version of the code
+        part.unlink()
+    main([*words, "--again"])
+    assert len(flown) == count + 1 and same(content, json.loads(capsys.readouterr().out))
+    next((tmp_path / "run" / "parts" / "logs").glob("*.trace.npz")).write_bytes(b"damaged")
+    assert main([*words, "--again"]) == 2
+    assert "remove it, and the flight is flown again" in capsys.readouterr().err
+
+
 def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
     whole = sim.sweep.flying.fly
 

@@ -48,7 +48,6 @@ TOML_COMMANDS = (
 #: Commands that read other kinds.
 COMMANDS = (
     *TOML_COMMANDS,
-    "tune --trials-of FILE",
     "tune --storage FILE",
     "sweep --report FILE",
     f"detect --rgb FILE {' '.join(CAMERA)}",
@@ -122,7 +121,7 @@ def test_values_of_a_sweep_that_are_not_finite(refuses: Callable[..., str], sect
 
 
 @pytest.mark.parametrize("name", [*JSON, *BYTES])
-@pytest.mark.parametrize("command", ["compare a b", "tune --trials-of a/summary.json"])
+@pytest.mark.parametrize("command", ["compare a b"])
 def test_json(refuses: Callable[..., str], command: str, name: str) -> None:
     for folder in ("a", "b"):
         Path(folder).mkdir()

@@ -61,7 +61,6 @@ CAMERA = "--fx 600 --fy 600 --cx 320 --cy 240".split()
         "sweep FILE",
         "sweep --report FILE",
         "tune --preset FILE",
-        "tune --trials-of FILE",
         "tune --storage FILE --out tune",
         "tune --trials 1 --out FILE",
         "bench vision --frames 20 --real FILE",

@@ -15,6 +15,7 @@ import sim.sweep.flying
 import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
+from sim.rivals import MPC
 from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, seeds, training
@@ -62,6 +63,7 @@ def flown(monkeypatch, tmp_path):
         monkeypatch.setattr(sim.tune.flights, name, made_up_figures)
     monkeypatch.setattr("sim.tune.space.require_margin", lambda *_: None)
     monkeypatch.setattr("sim.tune.space.motion_sensitivity", lambda *_: {"line": 1.5})
+    monkeypatch.setattr("sim.tune.space.contact_sensitivity", lambda *_: 1.5)
     monkeypatch.chdir(tmp_path)
     return count
 
@@ -176,7 +178,7 @@ def test_search_choice_and_report_fly_seeds_of_their_own():
 def test_the_rival_flies_its_weights_on_the_preset_of_the_qp():
     subject = Subject(ibvs_qp.preset("qp"), rival=True).having({"line": 1234.0})
     options = flights(training(), subject, "tuned", (5,), "geometric")[0].plan.options
-    assert (options.law, options.rival, options.rival_settings) == ("qp", "mpc", subject.weights)
+    assert (options.law, options.controller, options.controller_settings) == ("qp", MPC, subject.weights)
     assert subject.values["line"] == 1234.0 and "line = 1234.0" in subject.to_toml()
 
 
@@ -254,7 +256,7 @@ def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     assert {seed // 1000 for seed in flown} == {1, 2, 3}
     for name in ("qp-front.png", "qp-unseen.png"):
         assert Path("run/figures", name).stat().st_size > 10_000
-    assert len(json.loads(Path("run/qp_trials.json").read_text())["all_trials"]) == 24
+    assert json.loads(Path("run/qp.json").read_text())["gains"] == content["gains"]
     page = Path("run/report_qp.md").read_text()
     assert "verdict" in page and "better" in page
     flown.clear()
@@ -273,40 +275,16 @@ def test_nothing_better_keeps_the_shipped_preset(flown, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-def test_a_kept_record_gives_the_same_choice_without_the_flights_of_the_search(flown, capsys):
-    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
+def test_a_journal_gives_the_same_choice_without_the_flights_of_the_search(flown, capsys):
+    words = ["tune", "--trials", "24", "--unseen", "4", "--json"]
+    assert main([*words, "--out", "run"]) == 0
     once = json.loads(capsys.readouterr().out)
     flown.clear()
-    words = ["tune", "--trials-of", "run/qp_trials.json", "--unseen", "4", "--json", "--out", "again"]
-    assert main(words) == 0
+    assert main([*words, "--storage", "run/journal.log", "--out", "again"]) == 0
     again = json.loads(capsys.readouterr().out)
     assert {seed // 1000 for seed in flown} == {2, 3}
-    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen", "searched_by")
+    same = ("law", "seed", "features", "trials", "front", "finalists", "chosen", "gains", "unseen")
     assert {name: again[name] for name in same} == {name: once[name] for name in same}
-    assert "`ibvs-qp tune --law qp --unseen 4 --trials-of run/qp_trials.json`" in Path("again/qp.toml").read_text()
-
-
-@pytest.mark.slow
-def test_a_killed_trial_does_not_shift_the_numbers_of_a_kept_record(flown, capsys):
-    assert main(["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]) == 0
-    once = json.loads(capsys.readouterr().out)
-    record = json.loads(Path("run/qp_trials.json").read_text())
-    loser = next(place for place, row in enumerate(record["all_trials"]) if row["failed"])
-    assert 0 < loser < once["chosen"]
-    del record["all_trials"][loser]
-    Path("gap.json").write_text(json.dumps(record))
-    assert main(["tune", "--trials-of", "gap.json", "--unseen", "4", "--json", "--out", "again"]) == 0
-    again = json.loads(capsys.readouterr().out)
-    assert (again["chosen"], again["gains"]) == (once["chosen"], once["gains"])
-
-
-@pytest.mark.parametrize("words", [["--trials", "10"], ["--flights", "2"], ["--storage", "a.log"]])
-def test_options_of_a_search_are_refused_beside_a_kept_one(flown, capsys, words):
-    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
-    capsys.readouterr()
-    assert main(["tune", "--trials-of", "run/qp_trials.json", "--json", "--out", "again", *words]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and words[0] in err
 
 
 def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
@@ -340,26 +318,6 @@ def test_a_finalist_clearly_worse_in_one_scene_may_not_replace_the_shipped():
     assert not finalist(job=1.0, sticking=1.1, gusts=1.0).may_replace(shipped)
 
 
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"law": "paper"}, "law paper"),
-        ({"features": "rendered"}, "features rendered"),
-        ({"all_trials": []}, "no trial of the preset"),
-        ({"all_trials": [{"failed": 0.0}]}, "KeyError"),
-        ({"all_trials": 3}, "TypeError"),
-    ],
-)
-def test_a_record_of_another_search_is_refused(flown, capsys, change, named):
-    assert main(["tune", "--trials", "2", "--json", "--out", "run"]) == 0
-    capsys.readouterr()
-    record = json.loads(Path("run/qp_trials.json").read_text())
-    Path("other.json").write_text(json.dumps(record | change))
-    assert main(["tune", "--json", "--out", "again", "--trials-of", "other.json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and named in err
-
-
 def test_ctrl_c_says_how_to_go_on(flown, monkeypatch, capsys):
     def stops(*_, **__):
         raise KeyboardInterrupt
@@ -377,7 +335,6 @@ def test_ctrl_c_says_how_to_go_on(flown, monkeypatch, capsys):
         (["--jobs", "0"], "--jobs"),
         (["--seed", "-2"], "--seed"),
         (["--preset", "nowhere.toml"], "nowhere.toml"),
-        (["--trials-of", "nowhere.json"], "nowhere.json"),
         (["--law", "both"], "qp"),
         (["--storage", "sqlite:////nowhere/at/all.db", "--trials", "1"], "sqlite:////nowhere/at/all.db"),
         (["--storage", "mysterious://x", "--trials", "1"], "mysterious://x"),

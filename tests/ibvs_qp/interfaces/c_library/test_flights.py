@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,8 @@ import joblib
 import numpy as np
 import polars as pl
 import pytest
-from c_flown import CFlown
 from c_library import needs_compiler
 
-import sim.rivals
 from sim.evaluate.figures import FIGURES
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.closed_loop import fly
@@ -32,8 +29,8 @@ SEEDS = {False: 2, True: 4}
 
 
 def paint(seed: int, single: bool) -> tuple[bool, str, dict[str, Any]]:
-    sim.rivals.RIVALS["c"] = functools.partial(CFlown, single=single)
-    trace = fly(in_world(Scene(), "datasheet"), FlightOptions(rival="c", seed=seed, video=False))
+    options = FlightOptions(controller="c_flown:CFlown", controller_settings=single, seed=seed, video=False)
+    trace = fly(in_world(Scene(), "datasheet"), options)
     return trace.claimed, trace.reason, compute_metrics(trace)
 
 
