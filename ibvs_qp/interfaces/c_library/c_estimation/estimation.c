@@ -226,7 +226,7 @@ static void report(ibvs_flight *f) {
   now->tared = predicted[IBVS_PREDICTED_TARED] != 0;
   now->velocity_known = f->velocity_age_s < IBVS_VELOCITY_LIFE_S;
   now->distance = predicted[IBVS_PREDICTED_DISTANCE];
-  now->rate = predicted[IBVS_PREDICTED_RATE];
+  now->distance_rate = predicted[IBVS_PREDICTED_RATE];
   now->push = predicted[IBVS_PREDICTED_PUSH];
   now->push_noise = predicted[IBVS_PREDICTED_PUSH_NOISE];
   now->push_reference = f->controller.results[IBVS_OUT_PUSH_REFERENCE];
@@ -345,7 +345,7 @@ static void measure(const ibvs_flight *f, ibvs_measurement *m) {
   m->has_velocity = now->velocity_known;
   m->has_acceleration_bias = true;
   for (uint32_t i = 0; i < 3; ++i) {
-    m->velocity[i] = right[i] * velocity[0] + down[i] * velocity[1] - now->normal[i] * now->rate;
+    m->velocity[i] = right[i] * velocity[0] + down[i] * velocity[1] - now->normal[i] * now->distance_rate;
     m->acceleration_bias[i] = bias[0] * right[i] + bias[1] * down[i];
   }
   m->has_thrust_min = frame->has_thrust_min;

@@ -61,7 +61,7 @@ typedef struct {
   ibvs_edge kind;
   int32_t surface_side;
   uint32_t slot;            /* its place in the filter's state */
-  uint32_t frames;          /* pictures that showed it */
+  uint32_t pictures;        /* number of pictures that showed it */
   int64_t seen_ns;          /* capture of the last one; fresh_ns: tick at which it came */
   int64_t fresh_ns;
   ibvs_real offset;         /* from the tip along the normal, which points down or right [m] */
@@ -85,7 +85,7 @@ typedef struct {
   bool velocity_known;       /* measured within the last velocity_life_s */
   ibvs_real normal[3];       /* unit vector into the wall in B */
   ibvs_real distance;        /* tip to wall [m], while a wall is known */
-  ibvs_real rate;            /* of the distance [m/s] */
+  ibvs_real distance_rate;   /* [m/s], negative towards the wall */
   ibvs_real push;            /* filtered, on the wall [N]; push_noise: its deviation in free flight */
   ibvs_real push_noise;
   ibvs_real push_reference;  /* of the law in the tick before, within reach [N] */

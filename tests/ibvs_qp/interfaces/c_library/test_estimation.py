@@ -67,7 +67,7 @@ def test_a_recorded_flight_gives_the_estimates_and_thrusts_of_python() -> None:
     ticks = recorded_flight(CASE)
     largest = differences(flight_instance(CASES[CASE].config()), ticks)
     assert largest.pop("thrusts") <= THRUST_N
-    for name in ("normal", "distance", "rate", "push", "stiffness", "attitude", "angular_velocity", "wrench"):
+    for name in ("normal", "distance", "distance_rate", "push", "stiffness", "attitude", "angular_velocity", "wrench"):
         assert largest[name] == 0.0, name
     assert max(largest.values()) <= ESTIMATE, largest
     assert any(tick.followed for tick in ticks) and any(tick.estimated.in_contact for tick in ticks)
