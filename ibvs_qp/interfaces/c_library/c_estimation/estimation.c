@@ -92,10 +92,11 @@ static bool sound_line(const ibvs_line_feature *line) {
   for (uint32_t i = 0; line->has_segment && i < 4; ++i) {
     segment = segment && r_fabs(line->segment[i]) <= IBVS_LINE_BOUND;
   }
-  return segment && r_fabs(line->rho) <= IBVS_LINE_BOUND && r_fabs(line->theta) <= IBVS_LINE_BOUND &&
-         line->weight >= 0 && line->weight <= 1 && line->variance >= 0 && line->variance <= IBVS_VARIANCE_BOUND &&
-         (line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL) && line->surface_side >= -1 &&
-         line->surface_side <= 1;
+  /* The identities of lines without one are negative. */
+  return segment && line->track_id >= 0 && r_fabs(line->rho) <= IBVS_LINE_BOUND &&
+         r_fabs(line->theta) <= IBVS_LINE_BOUND && line->weight >= 0 && line->weight <= 1 && line->variance >= 0 &&
+         line->variance <= IBVS_VARIANCE_BOUND && (line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL) &&
+         line->surface_side >= -1 && line->surface_side <= 1;
 }
 
 /* Prediction. */

@@ -30,7 +30,8 @@ typedef enum { IBVS_UNKNOWN_EDGE = 0, IBVS_BOARD_EDGE = 1, IBVS_PAINT_EDGE = 2 }
 
 /* One line of a picture, x cos(theta) + y sin(theta) = rho in normalised coordinates. */
 typedef struct {
-  int64_t track_id;     /* identity from picture to picture; 0: role and order in the picture identify the line */
+  int64_t track_id;     /* identity from picture to picture, positive; 0: role and order in the picture identify the
+                           line; a line with a negative one is refused */
   ibvs_role role;
   ibvs_edge kind;
   int32_t surface_side; /* side of the working surface along the normal: 1, -1, 0 unknown */
@@ -56,7 +57,7 @@ typedef struct {
 
 /* A line on the wall, from picture to picture. */
 typedef struct {
-  int64_t track_id;
+  int64_t track_id;         /* of the feature; negative where that has none */
   ibvs_role role;
   ibvs_edge kind;
   int32_t surface_side;

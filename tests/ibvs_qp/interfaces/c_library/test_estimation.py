@@ -36,6 +36,8 @@ SINGLE, SINGLE_THRUST_N, SINGLE_STIFFNESS = 5e-5, 0.05, 500.0
 SOLVED = {0, 1, 5}
 MODES = ("free", "approach", "contact", "hold")
 REJECT_STAMP, REJECT_RATE, REJECT_LINES, REJECT_FEATURES, HOLD = 1, 1 << 2, 1 << 11, 1 << 18, 4
+#: Ticks of a flight with negative identities: both lines are tracked by then.
+NEGATIVE_TICKS = 400
 #: Wall behind the touched surface, for a felt surface before the observed one [m].
 BEHIND_M = 0.03
 
@@ -143,6 +145,28 @@ def test_a_surface_before_the_observed_one_has_the_estimates_of_python() -> None
     assert pilot.contact.surface_offset > 0.5 * BEHIND_M
     largest = differences(flight_instance(CASES[CASE].config()), ticks)
     assert largest.pop("thrusts") <= THRUST_N and max(largest.values()) <= ESTIMATE, largest
+
+
+def test_negative_identities_are_refused_as_in_python() -> None:
+    """Identities below zero are of lines without one: a given -2 would take the place of the first of them."""
+    frames = []
+    for frame in recording(CASE).frames[:NEGATIVE_TICKS]:
+        features = frame.features
+        if features is not None:
+            given = [dataclasses.replace(line, track_id=-1 - place) for place, line in enumerate(features.lines)]
+            given += [dataclasses.replace(line, track_id=0) for line in features.lines]
+            features = dataclasses.replace(features, lines=tuple(given))
+        frames.append(dataclasses.replace(frame, features=features))
+    ticks, own = flown(CASES[CASE].pilot(), frames), flight_instance(CASES[CASE].config())
+    for tick, followed, python, command in ticks:
+        lines = () if tick.frame.features is None else tick.frame.features.lines
+        rejected = own.estimate(tick.frame, tick.measurement).rejected
+        named = any("negative track_id" in reason for reason in command.rejected)
+        assert (rejected & REJECT_LINES != 0) == named == bool(lines)
+        own.act(tick.reference, followed)
+        found = own.estimates.lines[: own.estimates.line_count]
+        assert [line.track_id for line in found] == list(python.lines)
+    assert {-2, -3} == {line.track_id for line in found}
 
 
 def test_failing_inertial_sensors_hold_and_are_named() -> None:
