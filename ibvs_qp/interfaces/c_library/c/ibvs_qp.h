@@ -99,7 +99,8 @@ enum {
   IBVS_REJECT_GAINS = 1 << 15,         /* the last accepted ones stay in force */
   IBVS_REJECT_PROGRAM = 1 << 16,       /* OSQP's answer failed the acceptance test */
   IBVS_REJECT_RECOVERING = 1 << 17,    /* solved again, not yet for long */
-  IBVS_REJECT_FEATURES = 1 << 18       /* of ibvs_estimate: features too old, ahead, or not after the last ones */
+  IBVS_REJECT_FEATURES = 1 << 18       /* of ibvs_estimate: features too old, ahead, not after the last ones, or with a
+                                          refused frame */
 };
 
 /* Thrusts of one tick and how they came about. */

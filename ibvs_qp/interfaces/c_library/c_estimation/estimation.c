@@ -272,6 +272,8 @@ void ibvs_estimate(ibvs_flight *f, const ibvs_frame *frame, const ibvs_features 
       correct(f, features, capture_ns, &rejected);
     }
     report(f);
+  } else if (features != NULL) {
+    rejected |= IBVS_REJECT_FEATURES;
   }
   f->now.rejected = rejected;
   *estimates = f->now;

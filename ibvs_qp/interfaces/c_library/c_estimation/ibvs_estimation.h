@@ -139,7 +139,8 @@ void ibvs_flight_init(ibvs_flight *flight);
 /* As after ibvs_flight_init, with the gains in force. */
 void ibvs_flight_reset(ibvs_flight *flight);
 
-/* Estimates of a tick. features: of a picture that came with it, or NULL. */
+/* Estimates of a tick. features: of a picture that came with it, or NULL. Features with a refused frame are not used,
+ * IBVS_REJECT_FEATURES; they are accepted with a later frame. */
 void ibvs_estimate(ibvs_flight *flight, const ibvs_frame *frame, const ibvs_features *features,
                    ibvs_estimates *estimates);
 

@@ -179,11 +179,28 @@ def test_failing_inertial_sensors_hold_and_are_named() -> None:
         own.estimate(dataclasses.replace(tick.frame, angular_velocity=rate))
         command = own.act(tick.reference, followed)
         assert (command.outcome == HOLD) == fails and own.estimates.valid != fails, place
-        assert command.rejected == (REJECT_RATE if fails else 0) and command.stamp_ns == tick.frame.stamp_ns
+        refused = REJECT_RATE | (0 if tick.frame.features is None else REJECT_FEATURES)
+        assert command.rejected == (refused if fails else 0) and command.stamp_ns == tick.frame.stamp_ns
         assert place == 0 or np.abs(np.array(command.thrusts) - before).max() <= step + 1e-9
     assert abs(own.estimates.distance - ticks[-1].estimated.numbers["distance"]) < 0.01
-    own.estimate(tick.frame)
+    own.estimate(dataclasses.replace(tick.frame, features=None))
     assert own.act(tick.reference, followed).rejected == REJECT_STAMP
+
+
+def test_a_picture_with_a_refused_frame_is_named_and_may_come_again() -> None:
+    ticks, own = [tick.tick for tick in recorded_flight(CASE)], flight_instance(CASES[CASE].config())
+    place = next(k for k, tick in enumerate(ticks) if k >= 300 and tick.frame.features is not None)
+    for tick in ticks[:place]:
+        own.estimate(tick.frame)
+    picture, later = ticks[place].frame, ticks[place + 1]
+    assert picture.features is not None and later.frame.features is None
+    repeated = dataclasses.replace(picture, stamp_ns=ticks[place - 1].frame.stamp_ns)
+    assert own.estimate(repeated).rejected == REJECT_STAMP | REJECT_FEATURES
+    without_rate = dataclasses.replace(picture, angular_velocity=np.full(3, math.nan))
+    assert own.estimate(without_rate).rejected == REJECT_RATE | REJECT_FEATURES
+    assert own.act(later.reference, ()).rejected & REJECT_FEATURES
+    assert own.estimate(dataclasses.replace(later.frame, features=picture.features)).rejected == 0
+    assert {line.seen_ns for line in own.estimates.lines[: own.estimates.line_count]} == {picture.features.stamp_ns}
 
 
 def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
