@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+import subprocess
 from collections import defaultdict
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from c_flight import CFlight, PilotTick, flown, recorded_flight
-from c_library import flight_instance, needs_compiler
+from c_library import COMPILERS, FLAGS, flight_instance, make, needs_compiler, written
 from recorded_inputs import recording
 
 from ibvs_qp.command import Outcome
@@ -21,6 +24,10 @@ from ibvs_qp.pilot.painting.command import PaintingCommand, image_reference
 from tests.replay.cases import CASES
 
 pytestmark = needs_compiler
+
+PAGE = Path(__file__).parents[4] / "docs" / "c_library.md"
+#: Of an example: a newcomer copies it.
+STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 
 CASE = "press_beyond_reach"
 #: Largest difference of an estimate, in units of its own. Prediction and correction have the same bits; the sums that
@@ -221,6 +228,19 @@ def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
     features = dataclasses.replace(next(t.tick.frame.features for t in ticks if t.tick.frame.features), stamp_ns=1)
     later = dataclasses.replace(ticks[place + 1].tick.frame, features=features)
     assert own.estimate(later).rejected == REJECT_FEATURES
+
+
+def test_the_example_prints_what_the_page_shows(tmp_path: Path) -> None:
+    config, page = CASES[CASE].config(), PAGE.read_text(encoding="utf-8")
+    folder = written(config.controller, False, "", config.estimation)
+    make(folder, "build/libibvs_qp.a", FLAGS)
+    (command,) = re.findall(r"^cc (.*example_estimation\.c.*)$", page, re.MULTILINE)
+    (tmp_path / "flight").symlink_to(folder)
+    subprocess.run([COMPILERS[0], *STRICT, *command.split()], cwd=tmp_path, check=True)
+    done = subprocess.run(["./example"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+    assert "rejected 0x0" in done.stdout and done.stdout in page
+    assert len((folder / "example_estimation.c").read_text(encoding="utf-8").splitlines()) <= 60
+    make(folder, "build/example_estimation", "build/example_posix", FLAGS)
 
 
 def test_a_line_that_is_gone_leaves_the_others_their_targets() -> None:
