@@ -1,4 +1,4 @@
-"""RGB-D pictures of `rigid_body.py`: a bright board on a dark wall, and what the brush has painted on it."""
+"""RGB-D pictures of `rigid_body.py`: a bright board on a dark wall, and the paint of the brush on it."""
 
 import cv2
 import numpy as np

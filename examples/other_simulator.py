@@ -1,6 +1,6 @@
 """The whole painter on a simulator that is not MuJoCo: two rows on a board, by features instead of pictures.
 
-The simulator is `rigid_body.py` beside this file; yours needs to deliver what its `sense` collects.
+The simulator is `rigid_body.py` in this folder; yours needs to deliver the numbers that its `sense` collects.
 """
 
 import dataclasses

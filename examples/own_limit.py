@@ -1,4 +1,4 @@
-"""A limit of your own: the upward acceleration stays below a bound, and the command says what that costs.
+"""A limit of your own: the upward acceleration stays below a bound, and the command states the cost.
 
 The limit is soft: its slack lets the climb exceed the bound of 0.5 m/s^2 by a little, here 0.04 m/s^2.
 """

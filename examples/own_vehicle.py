@@ -1,6 +1,6 @@
 """A vehicle of your own: eight rotors, each with its own place and axis, a camera that looks up, a full inertia.
 
-The same as a TOML file: ``print(CONFIG.to_toml())``, and ``ibvs-qp vehicle FILE`` shows what its rotors can do.
+The same as a TOML file: ``print(CONFIG.to_toml())``, and ``ibvs-qp vehicle FILE`` shows the reach of its rotors.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """From raw frames to the finished job: `Pilot` with pictures, force sensor and IMU, and nothing else.
 
-`read` and `drive` are the two functions to write for a vehicle of your own; here they call the small simulator beside
-this file. With a real clock, `ibvs_qp.pilot.runner.run` keeps the rate.
+`read` and `drive` are the two functions to write for a vehicle of your own; here they call the small simulator in this
+folder. With a real clock, `ibvs_qp.pilot.runner.run` keeps the rate.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """HybridController in a loop of your own: press a wall with 5 N and slide along an edge, without MuJoCo.
 
-Everything that the controller needs is in `measure` and `main`; the vehicle is `rigid_body.py` beside this file.
+Everything that the controller needs is in `measure` and `main`; the vehicle is `rigid_body.py` in this folder.
 """
 
 import math
@@ -15,7 +15,7 @@ PUSH_N, SLIDE_M_S = 5.0, 0.05  # push; speed to the left, from 5 s on
 
 
 def measure(vehicle: Vehicle, stamp_ns: int) -> Measurement:
-    """What the sensors deliver at one tick."""
+    """Measurement of one tick."""
     left, right = (np.array([WALL_M, vehicle.tip_world[1] + side, EDGE_M]) for side in (-0.2, 0.2))
     line = vehicle.edge(left, right, stamp_ns, track=1)
     return Measurement(
@@ -39,7 +39,7 @@ def main() -> None:
     for tick in range(1, round(SECONDS / tick_s) + 1):
         measurement = measure(vehicle, round(tick * tick_s * 1e9))
         depth = 1.0 / measurement.plane[2]  # of the wall along the optical axis [m]
-        below_tip = (EDGE_M - vehicle.camera[2]) / depth  # where the edge is wanted in the picture, normalised
+        below_tip = (EDGE_M - vehicle.camera[2]) / depth  # target of the edge in the picture, normalised
         reference = Reference(
             push_force=PUSH_N,
             contact=True,

@@ -1,4 +1,4 @@
-"""A flight recorder for a loop of your own: record, replay to the bit, and see what other settings would command.
+"""A flight recorder for a loop of your own: record, replay bit-identically, compare other settings.
 
 Foxglove and Rerun open the file as well. Needs ``pip install -c constraints.txt -e '.[log]'``.
 """
@@ -20,7 +20,7 @@ file = Path(tempfile.mkdtemp()) / "flight.mcap"
 recorder = Recorder(file, HybridController(config))  # the line to add; its step() replaces the controller's
 side_n = 0.0
 for tick in range(1, 1001):
-    wanted = 0.2 if tick < 600 else 0.0
+    target = 0.2 if tick < 600 else 0.0
     command = recorder.step(
         Measurement(
             stamp_ns=round(tick * TICK_S * 1e9),
@@ -32,7 +32,7 @@ for tick in range(1, 1001):
             velocity=np.array((0.0, velocity, 0.0)),
             velocity_covariance=1e-4 * np.eye(3),
         ),
-        Reference(velocity=np.array((wanted, 0.0))),
+        Reference(velocity=np.array((target, 0.0))),
     )
     side_n = float(command.wrench[1])
     velocity, position = velocity + TICK_S * side_n / mass, position + TICK_S * velocity
@@ -40,7 +40,7 @@ recorder.close()
 
 flight = read_log(file)
 same = replay(flight)
-print(f"{same.ticks} ticks recorded in {file} ({file.stat().st_size / 1e6:.1f} MB); same to the bit: {same.same}")
+print(f"{same.ticks} ticks recorded in {file} ({file.stat().st_size / 1e6:.1f} MB); bit-identical: {same.same}")
 
 limits = dataclasses.replace(config.vehicle, thrust_max_n=12.0)
 weaker = replay(flight, HybridController(dataclasses.replace(config, vehicle=limits)))

@@ -20,7 +20,7 @@ SIGMA_RHO, SIGMA_THETA = 3e-4, 1e-3  # of a line: 0.2 px, 0.06 deg
 
 
 class Vehicle:
-    """Body axes front-right-down, and what its sensors read; public attributes are SI units."""
+    """Body axes front-right-down, and readings of the sensors; public attributes are SI units."""
 
     def __init__(self, params: VehicleParams) -> None:
         self.params, self.effectiveness = params, control_effectiveness(params.geometry)
@@ -47,7 +47,7 @@ class Vehicle:
 
     @property
     def raw_wrench(self) -> np.ndarray:
-        """What the force/torque sensor reads: the vehicle's force on the tool, gravity included [N, N m], (6,)."""
+        """Reading of the force/torque sensor: the vehicle's force on the tool, gravity included [N, N m], (6,)."""
         sensor, tool = np.array(self.params.force_torque_position_m), np.array(self.params.tool_position_m)
         load = self.params.tool_mass_kg * self.specific_force
         moment = np.cross(tool - sensor, load) - np.cross(self.tip - sensor, self.contact_force)
@@ -73,7 +73,7 @@ class Vehicle:
             self.turn = self.turn * Rotation.from_rotvec(step * self.omega)
 
     def sense(self, stamp_ns: int, image: RgbdFrame | None = None, features: FeatureFrame | None = None) -> SensorFrame:
-        """Attitude, IMU and force sensor now, with a new picture or what was found in it, if there is one."""
+        """Attitude, IMU and force sensor now, with a new picture or its features, if there is one."""
         return SensorFrame(
             stamp_ns=stamp_ns,
             attitude=self.quaternion,

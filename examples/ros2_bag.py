@@ -1,4 +1,4 @@
-"""A ROS 2 bag through the pilot, without ROS: what it saw and decided.
+"""A ROS 2 bag through the pilot, without ROS: distance, edges and decisions.
 
 It needs ``pip install -c constraints.txt -e '.[ros]'``. The bag is made up here: a second of hovering.
 Give your own instead: ``Bag(path, Topics(imu="/imu", ...))``.

@@ -122,7 +122,8 @@ class LineFeature:
         role: "horizontal" or "vertical".
         weight: 0 (fading out) to 1 (trusted).
         stamp_ns: Time at which the line was as described.
-        track_id: Identity kept from frame to frame; 0 for none: role and order in the frame identify the line then.
+        track_id: Identity kept from frame to frame, positive; 0 for none: role and order in the frame identify the line
+            then. Of features, a line with a negative one is refused.
         segment: Visible end points [[x1, y1], [x2, y2]], normalised, or None.
         surface_side: +1 if the working surface lies on the side the normal (cos, sin) points to, -1 if on the
             other, 0 if unknown.

@@ -23,7 +23,7 @@ class PushReport:
     """Watches the push of every tick, and names every change of the reason for which it is reduced.
 
     Attributes:
-        asked_n: Push that the strategy asks for [N]; 0 while it does not press.
+        asked_n: Push of the strategy's target [N]; 0 while it does not press.
         commanded_n: Push that the law commands after reach check and ramp [N].
         felt_n: Filtered push on the wall [N]; 0 out of contact.
         reduction: Why the push is below the asked one, with numbers; empty while it is not.

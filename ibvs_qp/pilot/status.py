@@ -27,7 +27,7 @@ class FlightStatus:
         reason: Why it ended or failed; empty until then.
         safety: State of the supervisor.
         events: Phases and events so far, oldest first.
-        push_asked_n: Push that the strategy asks for [N]; 0 while it does not press.
+        push_asked_n: Push of the strategy's target [N]; 0 while it does not press.
         push_commanded_n: Push that the law commands after reach check and ramp [N].
         push_flown_n: Filtered push on the wall [N]; 0 out of contact.
         push_reduction: Why the push is below the asked one, with numbers; empty while it is not.

@@ -12,7 +12,7 @@ from ibvs_qp.validation.geometry import VARIANCE_BOUND, read_line, read_lines, r
 from ibvs_qp.validation.numbers import matrix
 
 (_VELOCITY,) = FEATURE_FRAME.rows
-#: Identities of the first line of each role without one; further ones count down by two.
+#: Identities of the first line of each role without one; further ones count down by two. A given identity is positive.
 _HORIZONTAL_ID, _VERTICAL_ID = -2, -3
 #: Least eigenvalue of a covariance over the largest: below zero by rounding alone.
 LEAST_EIGENVALUE = -1e-9
@@ -31,8 +31,8 @@ def check_features(features: FeatureFrame, most_lines: int, rejected: list[str])
     if plane is None and features.plane is not None:
         rejected.append("features.plane: not 4 finite values with D != 0 in front of the camera")
     lines = read_lines(features.lines, read_line, most_lines, "features.lines", rejected)
-    if not all([line.track_id for line in lines]):
-        lines = _identified(lines)
+    if not all([line.track_id > 0 for line in lines]):
+        lines = _identified(lines, rejected)
     if len({line.track_id for line in lines}) < len(lines):
         first = {line.track_id: line for line in reversed(lines)}
         rejected.append(f"features.lines: {len(lines) - len(first)} with a track_id of another line")
@@ -41,8 +41,14 @@ def check_features(features: FeatureFrame, most_lines: int, rejected: list[str])
     return dataclasses.replace(features, lines=lines, plane=plane, velocity=velocity, velocity_covariance=covariance)
 
 
-def _identified(lines: tuple[LineFeature, ...]) -> tuple[LineFeature, ...]:
-    """Lines whose track_id is 0, none, identified by their role and their order in the frame."""
+def _identified(lines: tuple[LineFeature, ...], rejected: list[str]) -> tuple[LineFeature, ...]:
+    """Lines whose track_id is 0, none, identified by their role and their order in the frame.
+
+    Lines with a negative one are dropped: it may equal that of a line without one, or mark all lines of no track.
+    """
+    if negative := sum([line.track_id < 0 for line in lines]):
+        rejected.append(f"features.lines: {negative} with a negative track_id")
+        lines = tuple([line for line in lines if line.track_id >= 0])
     counts = {HORIZONTAL: _HORIZONTAL_ID, VERTICAL: _VERTICAL_ID}
     identified = []
     for line in lines:

@@ -16,7 +16,7 @@ from ibvs_qp.validation.numbers import FLOAT, attempt, matrix, number, text, vec
 LINE_BOUND = 1e6
 #: Largest variance, of an unobserved quantity.
 VARIANCE_BOUND = 1e12
-#: Largest identity of a track: logs hold 64 bits.
+#: Largest magnitude of a track's identity: logs and the C library hold 64 bits.
 TRACK_BOUND = 2**63 - 1
 #: Largest entry of a plane divided by D [1/m].
 INVERSE_DEPTH_BOUND = 1e3
@@ -72,7 +72,7 @@ def read_line(line: Any) -> LineFeature | None:
         if line is None:
             return None
         values = _values(line)
-    rho, theta, weight, role, _, stamp, _, side, covariance = values
+    rho, theta, weight, role, _, stamp, track, side, covariance = values
     if covariance.shape != (2, 2) or not (role == HORIZONTAL or role == VERTICAL):
         return None
     (a, b), (c, d) = covariance.tolist()
@@ -81,6 +81,7 @@ def read_line(line: Any) -> LineFeature | None:
         and abs(theta) <= LINE_BOUND
         and 0.0 <= weight <= 1.0
         and 0 <= stamp < STAMP_END
+        and -TRACK_BOUND <= track <= TRACK_BOUND
         and -1 <= side <= 1
         and 0.0 <= a <= VARIANCE_BOUND
         and 0.0 <= d <= VARIANCE_BOUND

@@ -180,7 +180,7 @@ _FIGURES = (
     ),
     # ------------------------------------------------------------------------------------------------------- paint
     Figure(
-        "stroke_m", "shortest stroke", "Length of the shortest painted row; good: the length that the scene asks for.",
+        "stroke_m", "shortest stroke", "Length of the shortest painted row; good: the length in the scene.",
         lambda p: p.stroke_m, "m", better=NEITHER, in_rows=True,
         exactly="shortest stroke, along it in contact on the board",
     ),
@@ -242,7 +242,7 @@ _FIGURES = (
     ),
     # -------------------------------------------------------------------------------------------------------- push
     Figure(
-        "push_asked_n", "push asked", "The push that the job asks for.",
+        "push_asked_n", "push asked", "The push of the job.",
         lambda p: p.trace.scene.paint.push_n, "N", better=NEITHER, exactly="push of the scene",
     ),
     Figure(

@@ -117,7 +117,7 @@ class Part:
 
     @cached_property
     def stroke_count(self) -> int:
-        """Strokes that the scene asks for; 0 for a strategy of the user's, which has legs."""
+        """Strokes of the scene's job; 0 for a strategy of the user's, which has legs."""
         return BoardGeometry(self.trace.scene).strokes if self.trace.legs is None else 0
 
     @property

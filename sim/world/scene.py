@@ -26,7 +26,7 @@ class BoardScene(Checked):
     height_m: float = setting(0.60, "height of the board", unit="m", low=0.1, high=10.0)
     bottom_m: float = setting(1.20, "height of the bottom edge above the ground", unit="m", low=0.5, high=50.0)
     slope_deg: float = setting(
-        0.0, "turn in its own plane, + clockwise as the camera sees it", unit="deg", low=-10.0, high=10.0
+        0.0, "turn in its own plane, + clockwise in the picture", unit="deg", low=-10.0, high=10.0
     )
     gap_m: float = setting(0.05, "distance of the board's face in front of the wall", unit="m", low=0.005, high=1.0)
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)

@@ -182,9 +182,9 @@ def test_the_own_vehicle_hovers() -> None:
     assert 8.0 < low <= high < 12.0 and push > 20.0
 
 
-def test_a_log_replays_to_the_bit_and_shows_what_weaker_rotors_would_have_commanded() -> None:
+def test_a_log_replays_bit_identically_and_shows_the_commands_of_weaker_rotors() -> None:
     text = printed("replay_log")
-    assert "1000 ticks recorded" in text and "same to the bit: True" in text
+    assert "1000 ticks recorded" in text and "bit-identical: True" in text
     differing, most_n = re.findall(r"rotors of 12 N: (\d+) ticks differ.*by ([\d.]+) N", text, re.DOTALL)[0]
     assert int(differing) > 900 and 1.0 < float(most_n) < 3.0
 

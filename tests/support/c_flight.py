@@ -22,7 +22,7 @@ from ibvs_qp.pilot import Pilot
 from tests.replay.cases import CASES
 
 KINDS = {"": 0, "board": 1, "paint": 2}
-#: Numbers of a tracked line that both have, by the names of Python.
+#: Numbers of a tracked line that both have by the same name.
 LINE_NUMBERS = (
     "offset",
     "deviation",
@@ -32,7 +32,6 @@ LINE_NUMBERS = (
     "seen_angle",
     "middle",
     "length",
-    "frames",
     "surface_side",
 )
 
@@ -85,7 +84,7 @@ def estimated(pilot: Pilot, push_reference: float) -> Estimated:
     numbers = {
         "normal": contact.normal,
         "distance": contact.distance if contact.known else 0.0,
-        "rate": contact.rate,
+        "distance_rate": contact.rate,
         "push": contact.push,
         "push_noise": contact.push_noise,
         "push_reference": push_reference,
@@ -104,12 +103,12 @@ def estimated(pilot: Pilot, push_reference: float) -> Estimated:
         estimator.tared,
         motion.velocity_age_s < pilot.config.estimation.velocity_life_s,
         {name: np.array(value, float) for name, value in numbers.items()},
-        {track: _numbers_of(line) for track, line in motion.lines.items()},
+        {track: _numbers_of(line, line.frames) for track, line in motion.lines.items()},
     )
 
 
-def _numbers_of(line: TrackedLine | Any) -> dict[str, float]:
-    return {name: float(getattr(line, name)) for name in LINE_NUMBERS}
+def _numbers_of(line: TrackedLine | Any, pictures: int) -> dict[str, float]:
+    return {name: float(getattr(line, name)) for name in LINE_NUMBERS} | {"pictures": float(pictures)}
 
 
 class CFlight:
@@ -160,9 +159,9 @@ class CFlight:
         )
         tracked = dict.fromkeys(("offset", "deviation", "residual", "angle", "angle_variance", "weight"), real)
         tracked |= dict.fromkeys(("fresh_weight", "seen_angle", "middle", "length"), real)
-        stamps = {"slot": whole, "frames": whole, "seen_ns": stamp, "fresh_ns": stamp}
+        stamps = {"slot": whole, "pictures": whole, "seen_ns": stamp, "fresh_ns": stamp}
         flags = ("valid", "wall_known", "in_contact", "stiffness_known", "tared", "velocity_known")
-        scalars = ("distance", "rate", "push", "push_noise", "push_reference", "time_in_contact", "stiffness")
+        scalars = ("distance", "distance_rate", "push", "push_noise", "push_reference", "time_in_contact", "stiffness")
         self.estimates = structure(
             "ibvs_estimates",
             stamp_ns=stamp,
@@ -240,7 +239,7 @@ class CFlight:
         names = (
             "normal",
             "distance",
-            "rate",
+            "distance_rate",
             "push",
             "push_noise",
             "push_reference",
@@ -255,5 +254,5 @@ class CFlight:
         if not own.wall_known:
             numbers["distance"] = np.zeros(())
         flags = own.wall_known, own.in_contact, own.stiffness_known, own.tared, own.velocity_known
-        lines = {line.track_id: _numbers_of(line) for line in own.lines[: own.line_count]}
+        lines = {line.track_id: _numbers_of(line, line.pictures) for line in own.lines[: own.line_count]}
         return Estimated(*flags, numbers, lines)

@@ -52,7 +52,8 @@ BAD_LINES: list[dict[str, Any]] = [
     *[{"covariance": value} for value in (None, -np.eye(2), np.full((2, 2), math.nan), [[1, 0], [0]], np.eye(3))],
     *[{"covariance": np.array(value)} for value in ([[-1.0, 0], [0, 1]], [[1.0, 0], [0, -1]], [[1, math.nan], [0, 1]])],
     *[{"segment": value} for value in (1e300, "ends", np.zeros(4), np.full((2, 2), math.nan), [[0, 0], [0, math.inf]])],
-    *[{"track_id": []}, {"role": "oblique"}, {"role": ["horizontal"]}, {"surface_side": 3}, {"kind": None}],
+    *[{"track_id": value} for value in ([], 2**63)],
+    *[{"role": "oblique"}, {"role": ["horizontal"]}, {"surface_side": 3}, {"kind": None}],
 ]
 
 
@@ -76,6 +77,14 @@ def test_lines_without_an_identity_get_one_by_role_and_order() -> None:
     assert [line.track_id for line in found.lines] == [-2, -3, -4, -5] and rejected == []
     alone, _ = checked(replace(GOOD, lines=(replace(LINE, role="vertical", track_id=0),)))
     assert alone.lines[0].track_id == -3, "the same in every frame"
+
+
+@pytest.mark.parametrize("track_id", [-1, -2, 1 - 2**63])
+def test_a_negative_identity_is_refused_and_displaces_no_line_without_one(track_id: int) -> None:
+    """Trackers mark an unknown line by -1; -2 is that of the first horizontal line without an identity."""
+    found, rejected = checked(replace(GOOD, lines=(replace(LINE, track_id=track_id), replace(LINE, track_id=0))))
+    assert [line.track_id for line in found.lines] == [-2]
+    assert rejected == ["features.lines: 1 with a negative track_id"]
 
 
 def test_of_two_lines_with_one_identity_the_second_is_dropped() -> None:

@@ -65,7 +65,7 @@ HUGE = np.longdouble("1e4000")
 INERTIAL_STAMPS = ("attitude_stamp_ns", "imu_stamp_ns")
 #: Fields of a line beside its parameters, and what breaks them.
 BROKEN_LABELS: list[tuple[str, Any]] = [
-    *[("track_id", value) for value in (None, [], 1.5, "1", True)],
+    *[("track_id", value) for value in (None, [], 1.5, "1", True, 2**63, -(2**63))],
     *[("stamp_ns", value) for value in (None, -1, 2**62, 0.5)],
     *[("surface_side", value) for value in (None, 2, 0.5, [1])],
     *[("kind", value) for value in (None, 1, [])],

@@ -70,6 +70,7 @@ def broken_features() -> dict[str, dict[str, Any]]:
         "NaN covariance": lines(covariance=np.full((2, 2), math.nan)),
         "list covariance": lines(covariance=[[1e-6, 0.0], [0.0, math.nan]]),
         "unhashable track": lines(track_id=[1]),
+        "negative track": lines(track_id=-1),
         "unhashable role": lines(role=["horizontal"]),
         "no line": {"lines": (None, "line", 7)},
         "no lines": {"lines": None},

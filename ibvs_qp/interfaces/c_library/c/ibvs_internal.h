@@ -1,4 +1,4 @@
-/* What the files of the library share. */
+/* Declarations that the files of the library share. */
 #ifndef IBVS_INTERNAL_H
 #define IBVS_INTERNAL_H
 

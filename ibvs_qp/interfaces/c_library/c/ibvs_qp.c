@@ -31,8 +31,8 @@ void ibvs_reset(ibvs_controller *c) {
 static void evaluate(ibvs_controller *c) {
   const ibvs_real *arguments[] = {c->inputs, c->states};
   ibvs_program *program = &c->program;
-  ibvs_real *outputs[] = {c->next_states, c->finite,      c->results,         program->p,   program->q,      program->a,
-                          program->lower, program->upper, program->unlimited, c->free,       c->line_rows, c->line_targets,
+  ibvs_real *outputs[] = {c->next_states, c->finite,      c->results,         program->p, program->q,   program->a,
+                          program->lower, program->upper, program->unlimited, c->free,    c->line_rows, c->line_targets,
                           c->secondary};
   if (isfinite(c->finite[0])) { /* the states stay where one of the next ones is not finite */
     memcpy(c->states, c->next_states, sizeof c->states);

@@ -70,7 +70,7 @@ typedef struct {
   ibvs_real standoff;     /* tip to wall while not in contact [m] */
   ibvs_real velocity[2];  /* in the wall plane, right and down [m/s] */
   ibvs_real travel[2];    /* velocity planned at this push [m/s] */
-  ibvs_real tilt[2];      /* roll and pitch [rad]: level but for a vehicle that lost a rotor */
+  ibvs_real tilt[2];      /* roll and pitch [rad]: level, except for a vehicle that lost a rotor */
   ibvs_real trim[2];      /* roll and pitch of a level hover with a limited rotor [rad] */
   bool contact;           /* press the wall, or keep the stand-off */
   uint32_t line_count;
@@ -99,7 +99,8 @@ enum {
   IBVS_REJECT_GAINS = 1 << 15,         /* the last accepted ones stay in force */
   IBVS_REJECT_PROGRAM = 1 << 16,       /* OSQP's answer failed the acceptance test */
   IBVS_REJECT_RECOVERING = 1 << 17,    /* solved again, not yet for long */
-  IBVS_REJECT_FEATURES = 1 << 18       /* of ibvs_estimate: features too old, ahead, or not after the last ones */
+  IBVS_REJECT_FEATURES = 1 << 18       /* of ibvs_estimate: features too old, ahead, not after the last ones, or with a
+                                          refused frame */
 };
 
 /* Thrusts of one tick and how they came about. */
@@ -107,7 +108,7 @@ typedef struct {
   int64_t stamp_ns;
   ibvs_real thrusts[IBVS_ROTORS];       /* [N] */
   ibvs_real wrench[6];                  /* of the thrusts, in B [N, N m] */
-  ibvs_real unallocated_wrench[6];      /* given up for the limits [N, N m] */
+  ibvs_real unallocated_wrench[6];      /* of the thrusts without limits, minus `wrench` [N, N m] */
   ibvs_real multipliers[IBVS_ROWS];     /* of the limits; 0 where one is not active or the program was not solved */
   ibvs_outcome outcome;
   ibvs_mode mode;

@@ -31,11 +31,11 @@ static int32_t index_of(const ibvs_controller *c, int32_t key) {
 static void assign(ibvs_controller *c) {
   const ibvs_reference *reference = &c->reference;
   for (uint32_t index = 0; index < IBVS_LINES; ++index) {
-    bool wanted = c->pairs[index] < 0;
-    for (uint32_t i = 0; i < reference->line_count && !wanted; ++i) {
-      wanted = key_of(reference, i) == c->pairs[index];
+    bool kept = c->pairs[index] < 0;
+    for (uint32_t i = 0; i < reference->line_count && !kept; ++i) {
+      kept = key_of(reference, i) == c->pairs[index];
     }
-    if (!wanted) {
+    if (!kept) {
       c->pairs[index] = -1;
       line_inputs(c, index)[CHANGED] = 1;
     }

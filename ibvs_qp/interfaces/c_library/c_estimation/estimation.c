@@ -92,10 +92,11 @@ static bool sound_line(const ibvs_line_feature *line) {
   for (uint32_t i = 0; line->has_segment && i < 4; ++i) {
     segment = segment && r_fabs(line->segment[i]) <= IBVS_LINE_BOUND;
   }
-  return segment && r_fabs(line->rho) <= IBVS_LINE_BOUND && r_fabs(line->theta) <= IBVS_LINE_BOUND &&
-         line->weight >= 0 && line->weight <= 1 && line->variance >= 0 && line->variance <= IBVS_VARIANCE_BOUND &&
-         (line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL) && line->surface_side >= -1 &&
-         line->surface_side <= 1;
+  /* The identities of lines without one are negative. */
+  return segment && line->track_id >= 0 && r_fabs(line->rho) <= IBVS_LINE_BOUND &&
+         r_fabs(line->theta) <= IBVS_LINE_BOUND && line->weight >= 0 && line->weight <= 1 && line->variance >= 0 &&
+         line->variance <= IBVS_VARIANCE_BOUND && (line->role == IBVS_HORIZONTAL || line->role == IBVS_VERTICAL) &&
+         line->surface_side >= -1 && line->surface_side <= 1;
 }
 
 /* Prediction. */
@@ -226,7 +227,7 @@ static void report(ibvs_flight *f) {
   now->tared = predicted[IBVS_PREDICTED_TARED] != 0;
   now->velocity_known = f->velocity_age_s < IBVS_VELOCITY_LIFE_S;
   now->distance = predicted[IBVS_PREDICTED_DISTANCE];
-  now->rate = predicted[IBVS_PREDICTED_RATE];
+  now->distance_rate = predicted[IBVS_PREDICTED_RATE];
   now->push = predicted[IBVS_PREDICTED_PUSH];
   now->push_noise = predicted[IBVS_PREDICTED_PUSH_NOISE];
   now->push_reference = f->controller.results[IBVS_OUT_PUSH_REFERENCE];
@@ -271,6 +272,8 @@ void ibvs_estimate(ibvs_flight *f, const ibvs_frame *frame, const ibvs_features 
       correct(f, features, capture_ns, &rejected);
     }
     report(f);
+  } else if (features != NULL) {
+    rejected |= IBVS_REJECT_FEATURES;
   }
   f->now.rejected = rejected;
   *estimates = f->now;
@@ -345,7 +348,7 @@ static void measure(const ibvs_flight *f, ibvs_measurement *m) {
   m->has_velocity = now->velocity_known;
   m->has_acceleration_bias = true;
   for (uint32_t i = 0; i < 3; ++i) {
-    m->velocity[i] = right[i] * velocity[0] + down[i] * velocity[1] - now->normal[i] * now->rate;
+    m->velocity[i] = right[i] * velocity[0] + down[i] * velocity[1] - now->normal[i] * now->distance_rate;
     m->acceleration_bias[i] = bias[0] * right[i] + bias[1] * down[i];
   }
   m->has_thrust_min = frame->has_thrust_min;

@@ -64,7 +64,7 @@ static void break_features(ibvs_features *features) {
     case 7: line->rho = broken_number(line->rho); break;
     case 8: line->variance = broken_number(line->variance); break;
     case 9: line->has_segment = true; break_entries(line->segment, 4); break;
-    case 10: line->track_id = below(IBVS_TRACKS + 2); break;
+    case 10: line->track_id = (int64_t)below(IBVS_TRACKS + 4) - 2; break;
     default: line->surface_side = (int32_t)below(5) - 2; break;
   }
 }

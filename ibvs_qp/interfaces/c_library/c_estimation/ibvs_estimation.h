@@ -30,7 +30,8 @@ typedef enum { IBVS_UNKNOWN_EDGE = 0, IBVS_BOARD_EDGE = 1, IBVS_PAINT_EDGE = 2 }
 
 /* One line of a picture, x cos(theta) + y sin(theta) = rho in normalised coordinates. */
 typedef struct {
-  int64_t track_id;     /* identity from picture to picture; 0: role and order in the picture identify the line */
+  int64_t track_id;     /* identity from picture to picture, positive; 0: role and order in the picture identify the
+                           line; a line with a negative one is refused */
   ibvs_role role;
   ibvs_edge kind;
   int32_t surface_side; /* side of the working surface along the normal: 1, -1, 0 unknown */
@@ -56,12 +57,12 @@ typedef struct {
 
 /* A line on the wall, from picture to picture. */
 typedef struct {
-  int64_t track_id;
+  int64_t track_id;         /* of the feature; negative where that has none */
   ibvs_role role;
   ibvs_edge kind;
   int32_t surface_side;
   uint32_t slot;            /* its place in the filter's state */
-  uint32_t frames;          /* pictures that showed it */
+  uint32_t pictures;        /* number of pictures that showed it */
   int64_t seen_ns;          /* capture of the last one; fresh_ns: tick at which it came */
   int64_t fresh_ns;
   ibvs_real offset;         /* from the tip along the normal, which points down or right [m] */
@@ -85,7 +86,7 @@ typedef struct {
   bool velocity_known;       /* measured within the last velocity_life_s */
   ibvs_real normal[3];       /* unit vector into the wall in B */
   ibvs_real distance;        /* tip to wall [m], while a wall is known */
-  ibvs_real rate;            /* of the distance [m/s] */
+  ibvs_real distance_rate;   /* [m/s], negative towards the wall */
   ibvs_real push;            /* filtered, on the wall [N]; push_noise: its deviation in free flight */
   ibvs_real push_noise;
   ibvs_real push_reference;  /* of the law in the tick before, within reach [N] */
@@ -138,7 +139,8 @@ void ibvs_flight_init(ibvs_flight *flight);
 /* As after ibvs_flight_init, with the gains in force. */
 void ibvs_flight_reset(ibvs_flight *flight);
 
-/* Estimates of a tick. features: of a picture that came with it, or NULL. */
+/* Estimates of a tick. features: of a picture that came with it, or NULL. Features with a refused frame are not used,
+ * IBVS_REJECT_FEATURES; they are accepted with a later frame. */
 void ibvs_estimate(ibvs_flight *flight, const ibvs_frame *frame, const ibvs_features *features,
                    ibvs_estimates *estimates);
 

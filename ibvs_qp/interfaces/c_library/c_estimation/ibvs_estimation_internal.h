@@ -1,4 +1,4 @@
-/* What the files of the estimation share. */
+/* Declarations that the files of the estimation share. */
 #ifndef IBVS_ESTIMATION_INTERNAL_H
 #define IBVS_ESTIMATION_INTERNAL_H
 

@@ -243,7 +243,7 @@ void ibvs_correct_line(ibvs_flight *f, const ibvs_line_feature *line, int64_t tr
   }
   memcpy(&f->predict_inputs[IBVS_PREDICT_RATES + 2 * track->slot], rates, 2 * sizeof *rates);
   const bool seen = line->has_segment && found[IBVS_CORRECTED_LENGTH] >= 0;
-  track->frames = (uint32_t)found[IBVS_CORRECTED_FRAMES];
+  track->pictures = (uint32_t)found[IBVS_CORRECTED_FRAMES];
   track->angle = found[IBVS_CORRECTED_ANGLE];
   track->deviation = found[IBVS_CORRECTED_DEVIATION];
   track->residual = found[IBVS_CORRECTED_RESIDUAL];
@@ -252,7 +252,7 @@ void ibvs_correct_line(ibvs_flight *f, const ibvs_line_feature *line, int64_t tr
   track->length = seen ? found[IBVS_CORRECTED_LENGTH] : 0;
   track->seen_ns = stamp_ns;
   track->fresh_ns = f->tick_ns;
-  track->fresh_weight = r_fmin(1, (ibvs_real)track->frames / IBVS_FRAMES_TO_TRUST) * line->weight;
+  track->fresh_weight = r_fmin(1, (ibvs_real)track->pictures / IBVS_FRAMES_TO_TRUST) * line->weight;
   track->surface_side = (int32_t)found[IBVS_CORRECTED_SIGN] * line->surface_side;
   track->kind = kind;
   f->lines_ns = stamp_ns;

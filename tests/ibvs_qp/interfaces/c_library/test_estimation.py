@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+import subprocess
 from collections import defaultdict
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from c_flight import CFlight, PilotTick, flown, recorded_flight
-from c_library import flight_instance, needs_compiler
+from c_library import COMPILERS, FLAGS, flight_instance, make, needs_compiler, written
 from recorded_inputs import recording
 
 from ibvs_qp.command import Outcome
@@ -21,6 +24,10 @@ from ibvs_qp.pilot.painting.command import PaintingCommand, image_reference
 from tests.replay.cases import CASES
 
 pytestmark = needs_compiler
+
+PAGE = Path(__file__).parents[4] / "docs" / "c_library.md"
+#: Of an example: a newcomer copies it.
+STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 
 CASE = "press_beyond_reach"
 #: Largest difference of an estimate, in units of its own. Prediction and correction have the same bits; the sums that
@@ -36,6 +43,8 @@ SINGLE, SINGLE_THRUST_N, SINGLE_STIFFNESS = 5e-5, 0.05, 500.0
 SOLVED = {0, 1, 5}
 MODES = ("free", "approach", "contact", "hold")
 REJECT_STAMP, REJECT_RATE, REJECT_LINES, REJECT_FEATURES, HOLD = 1, 1 << 2, 1 << 11, 1 << 18, 4
+#: Ticks of a flight with negative identities: both lines are tracked by then.
+NEGATIVE_TICKS = 400
 #: Wall behind the touched surface, for a felt surface before the observed one [m].
 BEHIND_M = 0.03
 
@@ -67,7 +76,7 @@ def test_a_recorded_flight_gives_the_estimates_and_thrusts_of_python() -> None:
     ticks = recorded_flight(CASE)
     largest = differences(flight_instance(CASES[CASE].config()), ticks)
     assert largest.pop("thrusts") <= THRUST_N
-    for name in ("normal", "distance", "rate", "push", "stiffness", "attitude", "angular_velocity", "wrench"):
+    for name in ("normal", "distance", "distance_rate", "push", "stiffness", "attitude", "angular_velocity", "wrench"):
         assert largest[name] == 0.0, name
     assert max(largest.values()) <= ESTIMATE, largest
     assert any(tick.followed for tick in ticks) and any(tick.estimated.in_contact for tick in ticks)
@@ -145,6 +154,28 @@ def test_a_surface_before_the_observed_one_has_the_estimates_of_python() -> None
     assert largest.pop("thrusts") <= THRUST_N and max(largest.values()) <= ESTIMATE, largest
 
 
+def test_negative_identities_are_refused_as_in_python() -> None:
+    """Identities below zero are of lines without one: a given -2 would take the place of the first of them."""
+    frames = []
+    for frame in recording(CASE).frames[:NEGATIVE_TICKS]:
+        features = frame.features
+        if features is not None:
+            given = [dataclasses.replace(line, track_id=-1 - place) for place, line in enumerate(features.lines)]
+            given += [dataclasses.replace(line, track_id=0) for line in features.lines]
+            features = dataclasses.replace(features, lines=tuple(given))
+        frames.append(dataclasses.replace(frame, features=features))
+    ticks, own = flown(CASES[CASE].pilot(), frames), flight_instance(CASES[CASE].config())
+    for tick, followed, python, command in ticks:
+        lines = () if tick.frame.features is None else tick.frame.features.lines
+        rejected = own.estimate(tick.frame, tick.measurement).rejected
+        named = any("negative track_id" in reason for reason in command.rejected)
+        assert (rejected & REJECT_LINES != 0) == named == bool(lines)
+        own.act(tick.reference, followed)
+        found = own.estimates.lines[: own.estimates.line_count]
+        assert [line.track_id for line in found] == list(python.lines)
+    assert {-2, -3} == {line.track_id for line in found}
+
+
 def test_failing_inertial_sensors_hold_and_are_named() -> None:
     config, ticks = CASES[CASE].config(), recorded_flight(CASE)[:1200]
     own, step = flight_instance(config), config.controller.vehicle.thrust_rate_n_s * config.controller.tick_s
@@ -155,11 +186,28 @@ def test_failing_inertial_sensors_hold_and_are_named() -> None:
         own.estimate(dataclasses.replace(tick.frame, angular_velocity=rate))
         command = own.act(tick.reference, followed)
         assert (command.outcome == HOLD) == fails and own.estimates.valid != fails, place
-        assert command.rejected == (REJECT_RATE if fails else 0) and command.stamp_ns == tick.frame.stamp_ns
+        refused = REJECT_RATE | (0 if tick.frame.features is None else REJECT_FEATURES)
+        assert command.rejected == (refused if fails else 0) and command.stamp_ns == tick.frame.stamp_ns
         assert place == 0 or np.abs(np.array(command.thrusts) - before).max() <= step + 1e-9
     assert abs(own.estimates.distance - ticks[-1].estimated.numbers["distance"]) < 0.01
-    own.estimate(tick.frame)
+    own.estimate(dataclasses.replace(tick.frame, features=None))
     assert own.act(tick.reference, followed).rejected == REJECT_STAMP
+
+
+def test_a_picture_with_a_refused_frame_is_named_and_may_come_again() -> None:
+    ticks, own = [tick.tick for tick in recorded_flight(CASE)], flight_instance(CASES[CASE].config())
+    place = next(k for k, tick in enumerate(ticks) if k >= 300 and tick.frame.features is not None)
+    for tick in ticks[:place]:
+        own.estimate(tick.frame)
+    picture, later = ticks[place].frame, ticks[place + 1]
+    assert picture.features is not None and later.frame.features is None
+    repeated = dataclasses.replace(picture, stamp_ns=ticks[place - 1].frame.stamp_ns)
+    assert own.estimate(repeated).rejected == REJECT_STAMP | REJECT_FEATURES
+    without_rate = dataclasses.replace(picture, angular_velocity=np.full(3, math.nan))
+    assert own.estimate(without_rate).rejected == REJECT_RATE | REJECT_FEATURES
+    assert own.act(later.reference, ()).rejected & REJECT_FEATURES
+    assert own.estimate(dataclasses.replace(later.frame, features=picture.features)).rejected == 0
+    assert {line.seen_ns for line in own.estimates.lines[: own.estimates.line_count]} == {picture.features.stamp_ns}
 
 
 def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
@@ -180,6 +228,19 @@ def test_lines_to_follow_have_targets_and_unknown_ones_are_named() -> None:
     features = dataclasses.replace(next(t.tick.frame.features for t in ticks if t.tick.frame.features), stamp_ns=1)
     later = dataclasses.replace(ticks[place + 1].tick.frame, features=features)
     assert own.estimate(later).rejected == REJECT_FEATURES
+
+
+def test_the_example_prints_what_the_page_shows(tmp_path: Path) -> None:
+    config, page = CASES[CASE].config(), PAGE.read_text(encoding="utf-8")
+    folder = written(config.controller, False, "", config.estimation)
+    make(folder, "build/libibvs_qp.a", FLAGS)
+    (command,) = re.findall(r"^cc (.*example_estimation\.c.*)$", page, re.MULTILINE)
+    (tmp_path / "flight").symlink_to(folder)
+    subprocess.run([COMPILERS[0], *STRICT, *command.split()], cwd=tmp_path, check=True)
+    done = subprocess.run(["./example"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True)
+    assert "rejected 0x0" in done.stdout and done.stdout in page
+    assert len((folder / "example_estimation.c").read_text(encoding="utf-8").splitlines()) <= 60
+    make(folder, "build/example_estimation", "build/example_posix", FLAGS)
 
 
 def test_a_line_that_is_gone_leaves_the_others_their_targets() -> None:

@@ -15,7 +15,7 @@ extern volatile ibvs_real motor_commands[IBVS_ROTORS];
 
 static ibvs_controller controller;
 static volatile uint32_t ticks;
-volatile ibvs_real motor_commands[IBVS_ROTORS]; /* [N]; what the motors' timers read */
+volatile ibvs_real motor_commands[IBVS_ROTORS]; /* [N]; read by the motors' timers */
 
 void tick_interrupt(void) { ticks += 1; }
 
@@ -42,7 +42,7 @@ int main(void) {
     while (done == ticks) {
       __asm volatile("wfi");
     }
-    done = ticks; /* a late step skips ticks: the stamp tells the controller how much time has passed */
+    done = ticks; /* a late step skips ticks: its stamp gives the time that has passed */
     read_sensors((int64_t)done * TICK_NS, &measurement);
     ibvs_step(&controller, &measurement, &reference, &command);
     write_thrusts(&command);

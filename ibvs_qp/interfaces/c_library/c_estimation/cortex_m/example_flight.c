@@ -15,7 +15,7 @@ extern volatile ibvs_real motor_commands[IBVS_ROTORS];
 
 static ibvs_flight flight;
 static volatile uint32_t ticks;
-volatile ibvs_real motor_commands[IBVS_ROTORS]; /* [N]; what the motors' timers read */
+volatile ibvs_real motor_commands[IBVS_ROTORS]; /* [N]; read by the motors' timers */
 
 void tick_interrupt(void) { ticks += 1; }
 
