@@ -45,7 +45,7 @@ class ExperimentCommand:
 
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME|FILE.toml")]
     """Experiment: force-hold, paint, ablation, noise-sweep, saturation, sloped-edge, friction, gust, rotor-derate,
-    approach, payload, rates, mismatch, worlds, rivals, all, or a spec of your own (docs/experiments.md)."""
+    approach, payload, rates, mismatch, worlds, rivals, fair, all, or a spec of your own (docs/experiments.md)."""
     again: Annotated[bool, flag] = False
     """Compute every figure again from the traces in --out, without a flight; flights without a trace are flown."""
     quick: Annotated[bool, flag] = False
@@ -79,7 +79,14 @@ class ExperimentCommand:
         notes = Console(stderr=True, quiet=self.json)
         _check_name(self.name)
         traces = self.traces or self.again
-        choice = Choice(quick=self.quick, seed=self.seed, features=self.features, traces=traces, world=self.world)
+        choice = Choice(
+            quick=self.quick,
+            seed=self.seed,
+            features=self.features,
+            traces=traces,
+            compiled=True,
+            world=self.world,
+        )
         runs = designs(self.name, choice)
         _print_plan(Console() if self.plan else notes, runs)
         if self.plan:

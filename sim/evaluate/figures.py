@@ -427,6 +427,11 @@ _FIGURES = (
         "Speed of a slide against the commanded one, from 1 s after its start.", unit="%", scale=100.0, digits=1,
     ),
     Figure(
+        "slide_held", "slide held",
+        "Whether a slide has at least 90 % of its speed and 95 % of the push that was asked.", better=MORE, digits=0,
+        matters=(0.5, "held or not"),
+    ),
+    Figure(
         "stuck_share", "time stuck",
         "Time of a slide, from 1 s after its start, at less than a fifth of the commanded speed.",
         unit="%", scale=100.0, digits=1,

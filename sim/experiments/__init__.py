@@ -16,5 +16,6 @@ NAMES = (
     "mismatch",
     "worlds",
     "rivals",
+    "fair",
 )
 ALL = "all"

@@ -163,7 +163,8 @@ def _setup(
 def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ...]:
     delay_s = flights.fault_delay_s
     if flights.fault == "derate":
-        rotor, fraction, reported = str(level["rotor"]), float(level["share"]), bool(level["told"])
+        rotor, fraction = str(level["rotor"]), float(level["share"])
+        reported = bool(level.get("reported", level.get("told", True)))
         return (Derate(delay_s=delay_s, rotor=rotor, share=fraction, reported=reported),)
     if flights.fault == "wind step":
         north, east, down = (float(level["wind"]) * entry for entry in DIRECTIONS[str(level["direction"])])

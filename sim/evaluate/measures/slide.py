@@ -23,6 +23,8 @@ from sim.flight.trace import Trace
 SLIDING_AFTER_S = 1.0
 #: A tip slower than this fraction of the commanded speed counts as stuck.
 STUCK_FRACTION = 0.2
+#: A slide is held at this fraction of its speed and of its push [-]: both together, as one is easy without the other.
+HELD_SPEED, HELD_PUSH = 0.9, 0.95
 #: Start of the text by which a command rejects a push beyond reach.
 _REDUCED = "reference.push_force"
 
@@ -48,6 +50,7 @@ def slide_figures(trace: Trace) -> dict[str, float]:
     return hold | {
         **attitude_figures(trace, after, whole),
         "speed_m_s": speed,
+        "slide_held": float(speed >= HELD_SPEED * target_speed and mean(push) >= HELD_PUSH * trace.scene.paint.push_n),
         "speed_error_share": abs(speed - target_speed) / target_speed,
         "stuck_share": float(np.mean(-np.gradient(tip[after, 0], t[after]) < STUCK_FRACTION * target_speed)),
         "path_rms_m": rms(height[after]),

@@ -14,6 +14,7 @@ import pytest
 from sim.experiments.losses.__main__ import main, step_times
 from sim.experiments.losses.comparison import Comparison, Outcome, comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
+from sim.rivals import MPC
 
 #: A row of the page: an opponent and four counts.
 _COUNTED = re.compile(r"\|[^|]+(\| \d+ ){4}\|$")
@@ -56,7 +57,7 @@ def test_every_opponent_flies_every_cell_of_the_qp_with_its_seeds(name: str) -> 
 
 def test_the_rival_flies_the_rival_and_the_reach_check_is_off_where_named() -> None:
     for run in runs_of(("saturation",)):
-        assert (run.plan.options.rival == "mpc") is run.variant.endswith("mpc")
+        assert (run.plan.options.controller == MPC) is run.variant.endswith("mpc")
         assert run.plan.config.controller.reach_check is not run.variant.startswith("no-reach-check")
 
 
@@ -119,14 +120,14 @@ def test_the_times_are_those_of_every_law_in_its_own_slide(monkeypatch: pytest.M
     flown = []
 
     def fly(scene: object, options: Any, **_: object) -> SimpleNamespace:
-        flown.append((options.law, options.rival, options.seed))
+        flown.append((options.law, options.controller, options.seed))
         return SimpleNamespace(step_us=[len(flown), 100.0 * len(flown), 1e6])
 
     monkeypatch.setattr("sim.experiments.losses.__main__.fly", fly)
     names = [("paper", name) for name in ("box", "sequential", "shared-gains", "standard")]
     names += [("qp", "mpc"), ("qp", "standard")]
     assert step_times() == [(*name, f"{100 * (place + 1)}") for place, name in enumerate(names)]
-    assert [(law, rival) for law, rival, _ in flown] == [("paper", "")] * 4 + [("qp", "mpc"), ("qp", "")]
+    assert [(law, rival) for law, rival, _ in flown] == [("paper", "")] * 4 + [("qp", MPC), ("qp", "")]
     assert len({seed for *_, seed in flown}) == 1
 
 
