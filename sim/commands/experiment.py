@@ -24,7 +24,7 @@ from sim.commands.options import (
     optional,
     usable_cores,
 )
-from sim.experiments import ALL, NAMES
+from sim.experiments import ALL, FAIR, NAMES
 from sim.world.worlds import DEFAULT_WORLD
 
 #: Folder of the record that `--again` reads, unless --out names another.
@@ -169,10 +169,10 @@ class ExperimentCommand:
 
 def _check_name(name: str) -> None:
     """Refuse a name that is neither a shipped experiment nor a file."""
-    if name in (*NAMES, ALL) or name.endswith(".toml"):
+    if name in (*NAMES, FAIR, ALL) or name.endswith(".toml"):
         return
-    near = difflib.get_close_matches(name, (*NAMES, ALL), n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"allowed are {', '.join((*NAMES, ALL))}, or a file.toml"
+    near = difflib.get_close_matches(name, (*NAMES, FAIR, ALL), n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"allowed are {', '.join((*NAMES, FAIR, ALL))}, or a file.toml"
     raise ConfigError(f"no experiment {name!r}; {hint}")
 
 

@@ -16,6 +16,7 @@ NAMES = (
     "mismatch",
     "worlds",
     "rivals",
-    "fair",
 )
 ALL = "all"
+#: Laws and gains crossed; it has a page of its own (`sim.experiments.fair`).
+FAIR = "fair"

@@ -15,7 +15,7 @@ from typing import Any
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, load_toml, setting, validate
 from sim.evaluate.figures import figure_of
-from sim.experiments import ALL, NAMES
+from sim.experiments import ALL, FAIR, NAMES
 from sim.experiments.criteria import Criteria, Criterion
 from sim.experiments.variants import REFERENCES, VARIANTS, Variant
 from sim.sweep.design import Parameter
@@ -173,7 +173,7 @@ def experiment(name: str) -> Experiment:
     if not name.endswith(".toml"):
         return load_toml(Experiment, SPECS / f"{name}.toml")
     found = load_toml(Experiment, Path(name))
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", found.name) or found.name in (*NAMES, ALL):
+    if not re.fullmatch(r"[A-Za-z0-9_-]+", found.name) or found.name in (*NAMES, FAIR, ALL):
         raise out_of_range("name", found.name, "", "allowed are letters, digits, - and _, and no name of a shipped one")
     for variant, own in found.variants.items():
         if VARIANTS.get(variant, own) != own:

@@ -1,4 +1,4 @@
-"""``python -m sim.experiments.fair TABLE > docs/experiments/fair.md``: the page of the record from its template.
+"""``python -m sim.experiments.fair TABLE`` prints the page of the record from its template.
 
 Words are those of ``page.md.jinja``; every number in it is a field of `Fields`, computed from the table.
 """
@@ -15,7 +15,8 @@ import numpy as np
 import polars as pl
 
 from sim.evaluate.figures import figure_of
-from sim.experiments.fair.comparison import GROUPS, NAME, OWN, Comparison, Outcome, comparisons, grouped
+from sim.experiments import FAIR
+from sim.experiments.fair.comparison import GROUPS, OWN, Comparison, Outcome, comparisons, grouped
 from sim.experiments.spec import experiment
 from sim.experiments.variants import VARIANTS
 from sim.flight.trace import law_name
@@ -127,7 +128,7 @@ def page(table: pl.DataFrame) -> str:
     fields = Fields(table)
     return template.render(
         f=fields,
-        spec=experiment(NAME),
+        spec=experiment(FAIR),
         GROUPS=GROUPS,
         MODELLED=MODELLED,
         ANALYTIC=ANALYTIC,

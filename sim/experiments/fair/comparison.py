@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from sim.experiments import FAIR
 from sim.experiments.relevance import threshold
 from sim.experiments.spec import Column, experiment
 from sim.sweep.paired import differences, exact_interval
 from sim.sweep.statistics import needed, parameters, split
 
-#: Name of the experiment.
-NAME = "fair"
 #: The QP as shipped, and its other gains: no opponent.
 OWN = (("qp", "standard"), ("qp", "exchanged-gains"))
 #: Figures that move together: a cell counts each group once.
@@ -83,7 +82,7 @@ class Comparison:
 
 def comparisons(table: pl.DataFrame) -> list[Comparison]:
     """Every figure of every cell of the QP against every opponent in it."""
-    columns = [column for column in experiment(NAME).columns if column.better]
+    columns = [column for column in experiment(FAIR).columns if column.better]
     found = []
     for key, rows in split(table, ("experiment",)):
         params = parameters(key)

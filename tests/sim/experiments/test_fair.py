@@ -6,9 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from sim.experiments import FAIR
 from sim.experiments.design import Choice, design
 from sim.experiments.fair.__main__ import Fields, page
-from sim.experiments.fair.comparison import NAME, OWN, Outcome, comparisons, grouped
+from sim.experiments.fair.comparison import OWN, Outcome, comparisons, grouped
 from sim.experiments.spec import experiment
 from sim.rivals import MPC
 from sim.sweep.mixed import CROSSED, law_and_gains
@@ -29,7 +30,7 @@ def flights(law_effect: float, gain_effect: float) -> pl.DataFrame:
                 size = float(np.exp(base + place + law_effect * one + gain_effect * other + rng.normal(0.0, 0.02)))
                 figures = {"path_rms_m": 0.002 * size, "path_rms_straight_m": 0.002 * size, "force_rms_n": 0.2}
                 rows.append(
-                    {"experiment": NAME, "law": law, "variant": variant, "seed": seed, "completed": True}
+                    {"experiment": FAIR, "law": law, "variant": variant, "seed": seed, "completed": True}
                     | {"param.kind": kind, "param.world": world, "param.level": level}
                     | {
                         "slide_held": None if kind == "paint" else float(law == "qp"),
@@ -76,7 +77,7 @@ def test_the_page_has_every_number_from_the_table():
 
 def test_every_cell_crosses_laws_and_gains_with_the_same_seeds():
     cells: dict[str, dict[tuple[str, str], list[int]]] = {}
-    for run in design(experiment(NAME), Choice(compiled=True)):
+    for run in design(experiment(FAIR), Choice(compiled=True)):
         cells.setdefault(str(run.params), {}).setdefault((run.law, run.variant), []).append(run.seed)
         assert (run.plan.options.controller == MPC) is (run.variant == "mpc")
     assert len(cells) == 24
