@@ -5,6 +5,7 @@ Each experiment is one file ``specs/NAME.toml``. Unknown keys and wrong types ar
 
 from __future__ import annotations
 
+import difflib
 import functools
 import math
 import re
@@ -14,7 +15,7 @@ from typing import Any
 
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, load_toml, setting, validate
-from sim.evaluate.figures import figure_of
+from sim.evaluate.figures import FIGURES, figure_of
 from sim.experiments import ALL, FAIR, NAMES
 from sim.experiments.criteria import Criteria, Criterion
 from sim.experiments.variants import REFERENCES, VARIANTS, Variant
@@ -161,6 +162,20 @@ class Experiment:
         return bool(self.folded) and self.folded.items() <= params.items()
 
 
+def _check_own(found: Experiment) -> None:
+    """Refuse misspelt figures and variants, and parameters without a level, of a spec of the user's."""
+    for column in found.columns:
+        if column.metric not in FIGURES:
+            near = difflib.get_close_matches(column.metric, FIGURES, n=1)
+            raise out_of_range("columns.metric", column.metric, "", f"no figure has this name; near: {near or 'none'}")
+    for flights in (*found.flights, *found.quick):
+        for variant in flights.levels.get("variant", ()):
+            if variant not in VARIANTS:
+                raise out_of_range("levels.variant", variant, "", f"allowed are {', '.join(VARIANTS)}")
+        if missing := found.params.keys() - flights.levels.keys():
+            raise out_of_range("levels", list(flights.levels), "", f"it lacks {', '.join(sorted(missing))} of params")
+
+
 @functools.cache
 def experiment(name: str) -> Experiment:
     """The experiment of a name, or of a spec of the user's (a TOML file), which then has its own name as well.
@@ -179,5 +194,6 @@ def experiment(name: str) -> Experiment:
         if VARIANTS.get(variant, own) != own:
             raise out_of_range("variants", variant, "", "a shipped variant has this name")
         VARIANTS[variant], REFERENCES[variant] = own, own.against
+    _check_own(found)
     _own[found.name] = found
     return found

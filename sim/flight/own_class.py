@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import inspect
@@ -10,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
+import ibvs_qp
 from ibvs_qp.config.errors import ConfigError
 
 Own = TypeVar("Own")
@@ -37,12 +39,12 @@ def built(name: str, base: type[Own] | tuple[type[Own], ...], option: str, *argu
     if not isinstance(own, type):
         raise ConfigError(f"{option} {name}: {place} has no class {word}")
     if not issubclass(own, base):
-        bases = " or ".join(f"ibvs_qp.{each.__name__}" for each in (base if isinstance(base, tuple) else (base,)))
+        bases = " or ".join(map(_public, base if isinstance(base, tuple) else (base,)))
         raise ConfigError(f"{option} {name}: {word} is no subclass of {bases}")
     try:
         return own(*arguments)
     except (Exception, SystemExit) as error:  # of the user's code
-        raise ConfigError(f"{option} {name}: {word}(...) raises {_described(error)}") from error
+        raise ConfigError(f"{option} {name}: {word}(...) raises {described(error)}") from error
 
 
 def source_of(name: str) -> str:
@@ -60,23 +62,31 @@ def _module(place: str, given: str) -> ModuleType:
         file = Path(place).resolve()
         if not file.is_file():
             raise ConfigError(f"{given}: there is no file {place}")
-        spec = importlib.util.spec_from_file_location(file.stem, file)
+        name = f"own_{hashlib.sha256(str(file).encode()).hexdigest()[:8]}_{file.stem}"  # no library's name
+        if name in sys.modules:
+            return sys.modules[name]
+        spec = importlib.util.spec_from_file_location(name, file)
         assert spec is not None and spec.loader is not None
-        before = sys.modules.get(file.stem)
-        if before is not None and getattr(before, "__file__", None) == str(file):
-            return before
-        module = sys.modules[file.stem] = importlib.util.module_from_spec(spec)
+        module = sys.modules[name] = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
         except BaseException:
-            del sys.modules[file.stem]
+            del sys.modules[name]
             raise
         return module
     except ConfigError:
         raise
     except (Exception, SystemExit) as error:  # of the user's code
-        raise ConfigError(f"{given}: {place} cannot be imported: {_described(error)}") from error
+        raise ConfigError(f"{given}: {place} cannot be imported: {described(error)}") from error
 
 
-def _described(error: BaseException) -> str:
+def _public(kind: type) -> str:
+    """Name under which a class is imported."""
+    name, parent = kind.__name__, sys.modules[kind.__module__.rpartition(".")[0]]
+    place = next((each for each in (ibvs_qp, parent) if hasattr(each, name)), sys.modules[kind.__module__])
+    return f"{place.__name__}.{name}"
+
+
+def described(error: BaseException) -> str:
+    """Type and text of an exception of the user's code."""
     return f"{type(error).__name__}: {str(error)[:LONGEST]}"

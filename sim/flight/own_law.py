@@ -11,7 +11,7 @@ from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.tasks import Task
 from sim.flight.jobs import Job
 from sim.flight.options import FlightOptions
-from sim.flight.own_class import built
+from sim.flight.own_class import built, described
 
 
 def own_law(options: FlightOptions, config: ControllerConfig) -> CheckedLaw | None:
@@ -25,7 +25,7 @@ def own_law(options: FlightOptions, config: ControllerConfig) -> CheckedLaw | No
         ConfigError: When a class cannot be loaded or constructed, or rows are given for another law.
     """
     if options.rows and (options.controller or options.law != "qp"):
-        raise ConfigError(f"rows {', '.join(options.rows)}: tasks and limits join the QP law only")
+        raise ConfigError(f"rows {', '.join(options.rows)}: tasks and limits join the QP law only (laws = ['qp'])")
     if options.controller:
         settings = () if options.controller_settings is None else (options.controller_settings,)
         return built(options.controller, CheckedLaw, "controller", config, *settings)  # type: ignore[type-abstract]
@@ -33,7 +33,12 @@ def own_law(options: FlightOptions, config: ControllerConfig) -> CheckedLaw | No
         return None
     rows = [built(name, (Task, Limit), "rows") for name in options.rows]  # type: ignore[type-abstract]
     tasks = [row for row in rows if isinstance(row, Task)]
-    return HybridController(config, tasks=tasks, limits=[row for row in rows if isinstance(row, Limit)])
+    try:
+        return HybridController(config, tasks=tasks, limits=[row for row in rows if isinstance(row, Limit)])
+    except ConfigError:
+        raise
+    except Exception as error:  # of the user's rows
+        raise ConfigError(f"rows {', '.join(options.rows)}: {described(error)}") from error
 
 
 def check_own(options: FlightOptions, config: PilotConfig, job: Job | None) -> None:

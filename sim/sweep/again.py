@@ -11,6 +11,7 @@ import polars as pl
 from ibvs_qp.config.errors import ConfigError, IbvsQpError
 from sim.flight.trace_log import load_trace
 from sim.sweep.design import Run
+from sim.sweep.fingerprint import configuration_hash
 from sim.sweep.flying import Row, figures_of, outcome
 from sim.sweep.parts import HEAD, PARAM, frame
 from sim.sweep.statistics import parameters
@@ -31,12 +32,13 @@ def score_again(
         workers: Processes side by side.
 
     Returns:
-        The rows in the order of the design, and the other runs. A flight that was refused keeps its row.
+        The rows in the order of the design, and the other runs: without a trace, or flown with another configuration.
+        A flight that was refused keeps its row.
     """
     import joblib
 
     rows = {_key(row, parameters(row)): row for row in table.to_dicts()}
-    flown = [(run, row) for run in runs if _is_kept(row := rows.get(_key_of(run)), folder) and row is not None]
+    flown = [(run, row) for run in runs if (row := rows.get(_key_of(run))) is not None and _is_kept(run, row, folder)]
     scored = joblib.Parallel(n_jobs=workers)(joblib.delayed(_scored)(run, row, folder) for run, row in flown)
     kept = {id(run) for run, _ in flown}
     return frame([row for row in scored if row is not None]), [run for run in runs if id(run) not in kept]
@@ -50,10 +52,11 @@ def in_order(runs: Sequence[Run], tables: Sequence[pl.DataFrame]) -> pl.DataFram
     return joined[sorted(range(len(order)), key=order.__getitem__)]
 
 
-def _is_kept(row: Row | None, folder: Path) -> bool:
-    if row is None:
-        return False
-    return not row["config_hash"] or bool(row["trace"] and (folder / row["trace"]).is_file())
+def _is_kept(run: Run, row: Row, folder: Path) -> bool:
+    """Whether the flight of a row is that of a run, and its trace is there; a refused one has none."""
+    if not row["config_hash"]:
+        return True
+    return row["config_hash"] == configuration_hash(run) and bool(row["trace"] and (folder / row["trace"]).is_file())
 
 
 def _scored(run: Run, row: Row, folder: Path) -> Row:
@@ -62,11 +65,13 @@ def _scored(run: Run, row: Row, folder: Path) -> Row:
     }
     if not row["trace"]:
         return kept
+    file = folder / row["trace"]
     try:
-        trace = load_trace(folder / row["trace"])
-    except IbvsQpError as error:
-        raise ConfigError(f"{error}; remove it, and the flight is flown again") from None
-    return kept | outcome(trace) | figures_of(run, trace)
+        trace = load_trace(file)
+        return kept | outcome(trace) | figures_of(run, trace)
+    except (IbvsQpError, AttributeError, KeyError) as error:  # damaged, or of a version without an input of a figure
+        reason = error if isinstance(error, IbvsQpError) else f"{file} lacks {error}"
+        raise ConfigError(f"{reason}; remove it, and the flight is flown again") from None
 
 
 def _key_of(run: Run) -> Key:

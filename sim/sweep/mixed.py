@@ -9,6 +9,7 @@ over those of the QP under the same law. It stands beside the paired intervals o
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -62,6 +63,8 @@ def law_and_gains(table: pl.DataFrame, metric: str) -> Mapping[str, Ratio]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a variance at its bound of zero is no fault here
         fitted = model.fit(reml=True, method="lbfgs")
+    if not fitted.converged:
+        return {name: Ratio(math.nan, math.nan, math.nan) for name in ("law", "gains", "interaction")}
     ends = fitted.conf_int()
     names = {"law": "law", "gains": "gains", "interaction": "law:gains"}
     return {

@@ -71,6 +71,8 @@ class Comparison:
         """Whether the whole exact interval is worse, or better, than the threshold that matters."""
         if self.pairs < needed():
             return Outcome.FEW
+        if math.isnan(self.interval[0]):  # too few flights that only one law completes
+            return Outcome.NEITHER
         low, high = self.interval
         return Outcome.LOST if low > self.least else Outcome.WON if high < -self.least else Outcome.NEITHER
 
@@ -107,9 +109,9 @@ def _against(
             metric="completed",
             words="flights completed by one law alone",
             worse=float(np.median(alone)) if len(alone) else 0.0,
-            interval=exact_interval(alone) if len(alone) else (math.nan, math.nan),
+            interval=exact_interval(alone) if len(alone) >= needed() else (math.nan, math.nan),
             least=0.0,
-            pairs=len(alone),
+            pairs=both.height,
         )
     ]
     result = differences(mine, theirs, [column.metric for column in columns])["differences"]

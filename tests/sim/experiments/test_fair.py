@@ -63,6 +63,11 @@ def test_a_larger_error_of_the_opponent_is_a_win_and_the_group_counts_once():
     assert {value for key, value in lost.items() if key[2] == "path"} == {Outcome.LOST}
 
 
+def test_flights_that_both_laws_complete_are_no_difference():
+    found = [each for each in comparisons(flights(0.0, 0.0)) if each.metric == "completed"]
+    assert found and {each.outcome for each in found} == {Outcome.NEITHER}
+
+
 def test_the_page_has_every_number_from_the_table():
     table = flights(0.8, 0.0)
     text, fields = page(table), Fields(table)

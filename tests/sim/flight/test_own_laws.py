@@ -51,6 +51,10 @@ class Cap(Limit):
     def rows(self, model):
         return [LimitRow(name="cap", unit="N", expression=model.thrust[1], lower=-1e3, upper=40.0, slack_weight=1e3)]
 
+class Raises(Task):
+    def rows(self, model):
+        return model.nothing
+
 class Other:
     pass
 """
@@ -122,9 +126,10 @@ def test_tasks_and_limits_join_the_program(folder):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"controller": "own.py:Other"}, "Other is no subclass of ibvs_qp.CheckedLaw"),
+        ({"controller": "own.py:Other"}, r"Other is no subclass of ibvs_qp\.checked_law\.CheckedLaw"),
         ({"controller": "nowhere:Law"}, "nowhere cannot be imported"),
-        ({"rows": ("own.py:Other",)}, "no subclass of ibvs_qp.Task or ibvs_qp.Limit"),
+        ({"rows": ("own.py:Other",)}, r"no subclass of ibvs_qp\.tasks\.Task or ibvs_qp\.limits\.Limit"),
+        ({"rows": ("own.py:Raises",)}, "rows own.py:Raises: AttributeError"),
         ({"rows": ("own.py:Quiet",), "law": "paper"}, "tasks and limits join the QP law only"),
         ({"rows": ("own.py:Quiet",), "controller": "own.py:Half"}, "tasks and limits join the QP law only"),
     ],
@@ -157,6 +162,22 @@ def test_an_experiment_of_the_users_has_its_own_variants(folder):
     assert flown["policy", "paper"].plan.options.controller == POLICY
     before = configuration_hash(flown["quiet", "qp"])
     assert before != configuration_hash(flown["standard", "qp"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "words"),
+    [
+        ("path_rms_m", "path_rms", "path_rms_m"),
+        ('["standard", "policy", "quiet"]', '["polizy"]', "polizy"),
+        ("wind = [1.0] }", "gust = [1.0] }", "it lacks wind of params"),
+    ],
+)
+def test_a_misspelt_experiment_is_refused(folder, wrong, right, words):
+    text = EXPERIMENT.replace("POLICY", POLICY).replace('"policy"', '"misspelt"', 1)
+    (folder / "misspelt.toml").write_text(text.replace(wrong, right))
+    experiment.cache_clear()
+    with pytest.raises(ConfigError, match=words):
+        experiment("misspelt.toml")
 
 
 def test_a_sweep_flies_a_law_of_the_users_and_ties_parameters(folder):
