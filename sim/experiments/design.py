@@ -82,6 +82,7 @@ def _cell(experiment: Experiment, flights: Flights, level: dict[str, Parameter],
             video=False,
             compiled=choice.compiled and not VARIANTS[variant].controller,
         )
+        check_own(options, ibvs_qp.preset(law), OwnJob(name=flights.strategy) if flights.strategy else None)
         prepared = functools.partial(_prepared, experiment, flights, level, options, variant, choice.world)
         shared = None if flights.scene == "random" else prepared(choice.seed)
         for index in range(flights.seeds):
@@ -118,7 +119,6 @@ def _prepared(
     setup = _setup(experiment, flights, level, options.law, variant, scene)
     config = pilot_config(setup.scene, options, setup.pilot)
     check_job(setup.scene, config, options.features, setup.job)
-    check_own(options, config, setup.job)
     return setup, config
 
 
@@ -164,7 +164,7 @@ def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ..
     delay_s = flights.fault_delay_s
     if flights.fault == "derate":
         rotor, fraction = str(level["rotor"]), float(level["share"])
-        reported = bool(level.get("reported", level.get("told", True)))
+        reported = bool(level.get("reported", level.get("told", True)))  # stored tables have the older name
         return (Derate(delay_s=delay_s, rotor=rotor, share=fraction, reported=reported),)
     if flights.fault == "wind step":
         north, east, down = (float(level["wind"]) * entry for entry in DIRECTIONS[str(level["direction"])])

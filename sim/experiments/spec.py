@@ -168,10 +168,14 @@ def _check_own(found: Experiment) -> None:
         if column.metric not in FIGURES:
             near = difflib.get_close_matches(column.metric, FIGURES, n=1)
             raise out_of_range("columns.metric", column.metric, "", f"no figure has this name; near: {near or 'none'}")
+    for variant, own in found.variants.items():
+        if VARIANTS.get(variant, own) != own:
+            raise out_of_range("variants", variant, "", "another variant has this name")
+    known = VARIANTS | found.variants
     for flights in (*found.flights, *found.quick):
         for variant in flights.levels.get("variant", ()):
-            if variant not in VARIANTS:
-                raise out_of_range("levels.variant", variant, "", f"allowed are {', '.join(VARIANTS)}")
+            if variant not in known:
+                raise out_of_range("levels.variant", variant, "", f"allowed are {', '.join(known)}")
         if missing := found.params.keys() - flights.levels.keys():
             raise out_of_range("levels", list(flights.levels), "", f"it lacks {', '.join(sorted(missing))} of params")
 
@@ -190,10 +194,8 @@ def experiment(name: str) -> Experiment:
     found = load_toml(Experiment, Path(name))
     if not re.fullmatch(r"[A-Za-z0-9_-]+", found.name) or found.name in (*NAMES, FAIR, ALL):
         raise out_of_range("name", found.name, "", "allowed are letters, digits, - and _, and no name of a shipped one")
-    for variant, own in found.variants.items():
-        if VARIANTS.get(variant, own) != own:
-            raise out_of_range("variants", variant, "", "a shipped variant has this name")
-        VARIANTS[variant], REFERENCES[variant] = own, own.against
     _check_own(found)
+    VARIANTS.update(found.variants)
+    REFERENCES.update({variant: own.against for variant, own in found.variants.items()})
     _own[found.name] = found
     return found

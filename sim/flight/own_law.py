@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
@@ -42,12 +44,16 @@ def own_law(options: FlightOptions, config: ControllerConfig) -> CheckedLaw | No
 
 
 def check_own(options: FlightOptions, config: PilotConfig, job: Job | None) -> None:
-    """Construct the user's classes of a flight once.
+    """Construct the user's classes of a flight, those of a law once in a process.
 
     Raises:
         ConfigError: When one of them cannot be loaded or constructed.
     """
-    if not options.controller.startswith("sim.rivals."):  # shipped
-        own_law(options, config.controller)
+    _construct(options.controller, options.rows, options.law, config.controller)
     if job is not None:
         job.strategy(config.painting)
+
+
+@functools.lru_cache(maxsize=64)
+def _construct(controller: str, rows: tuple[str, ...], law: str, config: ControllerConfig) -> None:
+    own_law(FlightOptions(controller=controller, rows=rows, law=law), config)

@@ -6,8 +6,6 @@ Words are those of ``page.md.jinja``; every number in it is a field of `Fields`,
 from __future__ import annotations
 
 import sys
-from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +13,15 @@ import numpy as np
 import polars as pl
 
 from sim.evaluate.figures import figure_of
-from sim.experiments import FAIR
-from sim.experiments.fair.comparison import GROUPS, OWN, Comparison, Outcome, comparisons, grouped
-from sim.experiments.spec import experiment
+from sim.experiments.fair.comparison import OWN, comparisons, grouped, opponent_name
+from sim.experiments.opponent import Comparison, Outcome
 from sim.experiments.variants import VARIANTS
-from sim.flight.trace import law_name
 from sim.sweep.mixed import Ratio, law_and_gains
 from sim.sweep.paired import exact_interval
 from sim.sweep.statistics import parameters, select, split
 from sim.sweep.tables import read_tables
 
 TEMPLATE = Path(__file__).with_name("page.md.jinja")
-#: Laws and variants of the analytic law with its own rows, of which the best of a cell counts.
-ANALYTIC = (("paper", "standard"), ("paper", "shared-gains"), ("paper", "box"))
-#: Figures of the mixed model: those of jobs that paint or slide.
-MODELLED = ("path_rms_m", "force_rms_n", "tilt_peak_deg", "yaw_peak_deg")
 
 
 class Fields:
@@ -39,10 +31,12 @@ class Fields:
         table: Flights of the experiment.
     """
 
+    #: Figures of the mixed model: those of jobs that paint or slide.
+    MODELLED = ("path_rms_m", "force_rms_n", "tilt_peak_deg", "yaw_peak_deg")
+
     def __init__(self, table: pl.DataFrame) -> None:
-        self.table = table
-        self.found = comparisons(table)
-        self._groups = grouped(self.found)
+        self.table, self._found = table, comparisons(table)
+        self._groups = grouped(self._found)
 
     @property
     def cells(self) -> list[dict[str, Any]]:
@@ -50,18 +44,18 @@ class Fields:
         return [parameters(key) for key, _ in split(self.table, ("experiment",))]
 
     @property
-    def opponents(self) -> list[tuple[str, str]]:
-        """Law and variant of every opponent."""
-        return sorted({each.opponent for each in self.found})
+    def laws(self) -> list[tuple[str, str]]:
+        """Law and variant of the QP as shipped, then of every opponent."""
+        flown = set(self.table.select("law", "variant").unique().rows())
+        return [OWN[0], *sorted(flown - set(OWN))]
 
-    def name(self, opponent: tuple[str, str]) -> str:
+    def name(self, law: str, variant: str) -> str:
         """Name of a law with its variant."""
-        law, variant = opponent
-        return {"mpc": "prediction over 0.3 s", "standard": law_name(law)}.get(variant, f"{law_name(law)}, {variant}")
+        return opponent_name(law, variant)
 
-    def words(self, opponent: tuple[str, str]) -> str:
-        """Description of its variant."""
-        return VARIANTS[opponent[1]].words
+    def words(self, variant: str) -> str:
+        """Description of a variant."""
+        return VARIANTS[variant].words
 
     def median(self, metric: str, law: str, variant: str = "standard", **cell: Any) -> str:
         """Median of a figure over the flights that ended as planned, with its unit."""
@@ -78,29 +72,26 @@ class Fields:
         low, high = exact_interval(values)
         return f"{np.median(values):+.3g} ({low:+.3g} to {high:+.3g}) {figure.unit}".rstrip()
 
-    def done(self, law: str, variant: str = "standard", **cell: Any) -> str:
+    def done(self, law: str, variant: str, cell: dict[str, Any]) -> str:
         """Flights that ended as planned, of all."""
         rows = self._rows(law, variant, cell)
         return f"{rows['completed'].sum()} of {rows.height}"
 
-    def share(self, metric: str, law: str, variant: str = "standard", **cell: Any) -> str:
-        """Flights in which a flag is set, of all."""
+    def held(self, law: str, variant: str, cell: dict[str, Any]) -> str:
+        """Slides held, of all flights; empty for a cell that does not slide."""
         rows = self._rows(law, variant, cell)
-        return f"{int(rows[metric].fill_null(0.0).sum())} of {rows.height}"
+        slides = rows["slide_held"].drop_nulls() if "slide_held" in rows.columns else []
+        return f", held {int(sum(slides))} of {rows.height}" if len(slides) else ""
 
-    def count(self, outcome: str, opponent: tuple[str, str], kinds: Sequence[str] = ()) -> int:
-        """Groups of figures with an outcome (a name of `Outcome`) against an opponent, of cells of those kinds."""
-        sought = Outcome[outcome]
-        keys = (key for key, value in self._groups.items() if value is sought and key[0] == opponent)
-        return sum(1 for _, cell, _ in keys if not kinds or any(f"'kind': '{kind}'" in cell for kind in kinds))
+    def count(self, name: str, *outcomes: str) -> int:
+        """Groups of figures against an opponent that have exactly these outcomes (names of `Outcome`)."""
+        sought = {Outcome[each] for each in outcomes}
+        return sum(1 for key, value in self._groups.items() if key[0] == name and value == sought)
 
-    def single(self, outcome: str) -> list[Comparison]:
-        """Figures with an outcome, in the order of the cells."""
-        return [each for each in self.found if each.outcome is Outcome[outcome]]
-
-    def lost_groups(self) -> Counter[str]:
-        """Lost groups of figures by group, over all opponents."""
-        return Counter(group for (_, _, group), value in self._groups.items() if value is Outcome.LOST)
+    @property
+    def lost(self) -> list[Comparison]:
+        """Figures in which the QP is worse, in the order of the cells."""
+        return [each for each in self._found if each.outcome is Outcome.LOST]
 
     def mixed(self, metric: str) -> dict[str, Ratio]:
         """Effects of law and gains by the mixed model."""
@@ -110,8 +101,7 @@ class Fields:
         """Name of a figure."""
         return figure_of(metric).label
 
-    @staticmethod
-    def cell_text(params: dict[str, Any]) -> str:
+    def cell_text(self, params: dict[str, Any]) -> str:
         """A cell in words."""
         return f"{params['kind']} {params['level']:g}, {params['world']}"
 
@@ -124,17 +114,7 @@ def page(table: pl.DataFrame) -> str:
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False)  # nosec
-    template = environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
-    fields = Fields(table)
-    return template.render(
-        f=fields,
-        spec=experiment(FAIR),
-        GROUPS=GROUPS,
-        MODELLED=MODELLED,
-        ANALYTIC=ANALYTIC,
-        flights=table.height,
-        Outcome=Outcome,
-    )
+    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(f=Fields(table))
 
 
 if __name__ == "__main__":

@@ -1,21 +1,16 @@
-"""The QP against every other law in every cell, seed by seed; figures that move together count once."""
+"""The QP against every other law in every cell of the experiment ``fair``; figures that move together count once."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from enum import Enum
-from typing import Any
+from collections.abc import Iterable
 
-import numpy as np
 import polars as pl
 
 from sim.experiments import FAIR
-from sim.experiments.relevance import threshold
-from sim.experiments.spec import Column, experiment
-from sim.sweep.paired import differences, exact_interval
-from sim.sweep.statistics import needed, parameters, split
+from sim.experiments.opponent import COMPLETED, Comparison, Outcome, against
+from sim.experiments.spec import experiment
+from sim.flight.trace import law_name
+from sim.sweep.statistics import parameters, split
 
 #: The QP as shipped, and its other gains: no opponent.
 OWN = (("qp", "standard"), ("qp", "exchanged-gains"))
@@ -28,121 +23,41 @@ GROUPS = {
     "thrust rate": ("jitter_n_s",),
     "disturbance": ("recovery_s", "fault_path_peak_m", "fault_force_peak_n"),
     "rotor loss": ("survived_s", "push_spike_n"),
-    "completed": ("completed",),
+    COMPLETED: (COMPLETED,),
 }
 
 
-class Outcome(Enum):
-    """Of a comparison, or of a group of them."""
-
-    WON = "QP better"
-    LOST = "QP worse"
-    MIXED = "better and worse"
-    NEITHER = "no difference that matters"
-    FEW = "too few pairs"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """A figure of the QP and of an opponent over the seeds that both flew.
-
-    Attributes:
-        params: Parameters of the cell.
-        opponent: Law and variant.
-        metric: Figure, or "completed": flights that only one law completes.
-        words: Figure and unit.
-        worse: Median of how much worse the QP is, in that unit.
-        interval: Its exact interval.
-        least: Least difference that matters.
-        pairs: Seeds with both figures.
-    """
-
-    params: dict[str, Any]
-    opponent: tuple[str, str]
-    metric: str
-    words: str
-    worse: float
-    interval: tuple[float, float]
-    least: float
-    pairs: int
-
-    @property
-    def outcome(self) -> Outcome:
-        """Whether the whole exact interval is worse, or better, than the threshold that matters."""
-        if self.pairs < needed():
-            return Outcome.FEW
-        if math.isnan(self.interval[0]):  # too few flights that only one law completes
-            return Outcome.NEITHER
-        low, high = self.interval
-        return Outcome.LOST if low > self.least else Outcome.WON if high < -self.least else Outcome.NEITHER
-
-    @property
-    def group(self) -> str:
-        """Name of its group."""
-        return next(name for name, metrics in GROUPS.items() if self.metric in metrics)
+def opponent_name(law: str, variant: str) -> str:
+    """Name of a law with its variant."""
+    names = {"mpc": "prediction over 0.3 s", "standard": law_name(law)}
+    return names.get(variant, f"{law_name(law)}, {variant}")
 
 
 def comparisons(table: pl.DataFrame) -> list[Comparison]:
     """Every figure of every cell of the QP against every opponent in it."""
-    columns = [column for column in experiment(FAIR).columns if column.better]
-    found = []
+    found, columns = [], experiment(FAIR).columns
     for key, rows in split(table, ("experiment",)):
-        params = parameters(key)
         flown = {(str(law), str(variant)): part for (law, variant), part in rows.group_by("law", "variant")}
-        mine = flown[OWN[0]]
-        shown = [each for each in columns if each.where.items() <= params.items() and each.metric in rows.columns]
         for opponent in sorted(flown.keys() - set(OWN)):
-            found += _against(params, opponent, mine, flown[opponent], shown)
+            name = opponent_name(*opponent)
+            found += against(FAIR, parameters(key), name, flown[OWN[0]], flown[opponent], columns)
     return found
 
 
-def _against(
-    params: dict[str, Any], opponent: tuple[str, str], mine: pl.DataFrame, theirs: pl.DataFrame, columns: list[Column]
-) -> list[Comparison]:
-    cell = {"params": params, "opponent": opponent}
-    both = mine.join(theirs, on="seed", suffix=".second")
-    ended = (both["completed.second"].cast(float) - both["completed"].cast(float)).to_numpy()
-    alone = ended[ended != 0.0]
-    found = [
-        Comparison(
-            **cell,
-            metric="completed",
-            words="flights completed by one law alone",
-            worse=float(np.median(alone)) if len(alone) else 0.0,
-            interval=exact_interval(alone) if len(alone) >= needed() else (math.nan, math.nan),
-            least=0.0,
-            pairs=both.height,
-        )
-    ]
-    result = differences(mine, theirs, [column.metric for column in columns])["differences"]
-    return found + [_of(column, result[column.metric], cell) for column in columns if column.metric in result]
+def grouped(found: Iterable[Comparison]) -> dict[tuple[str, str, str], frozenset[Outcome]]:
+    """Outcomes of every group of figures by opponent, cell and group: better, worse, both, or neither.
 
-
-def _of(column: Column, found: dict[str, float], cell: dict[str, Any]) -> Comparison:
-    """A figure in its unit; the difference is that of the opponent to the QP."""
-    scale = column.scale * column.better
-    low, high = sorted((scale * found["sure_low"], scale * found["sure_high"]))
-    return Comparison(
-        **cell,
-        metric=column.metric,
-        words=f"{column.label}{', ' if column.unit else ''}{column.unit}",
-        worse=scale * found["median"],
-        interval=(low, high),
-        least=threshold(column),
-        pairs=int(found["pairs"]),
-    )
-
-
-def grouped(found: Iterable[Comparison]) -> dict[tuple[tuple[str, str], str, str], Outcome]:
-    """Outcome of every group of figures by opponent, cell and group."""
-    groups: dict[tuple[tuple[str, str], str, str], list[Outcome]] = {}
+    Too few flights that only one law completes are no difference: all seeds of a cell are flown.
+    """
+    groups: dict[tuple[str, str, str], set[Outcome]] = {}
     for each in found:
-        groups.setdefault((each.opponent, str(each.params), each.group), []).append(each.outcome)
+        group = next(name for name, metrics in GROUPS.items() if each.metric in metrics)
+        few = each.metric == COMPLETED and each.outcome is Outcome.FEW
+        outcome = Outcome.NEITHER if few else each.outcome
+        groups.setdefault((each.opponent, str(each.params), group), set()).add(outcome)
     return {key: _joint(outcomes) for key, outcomes in groups.items()}
 
 
-def _joint(outcomes: Sequence[Outcome]) -> Outcome:
-    won, lost = Outcome.WON in outcomes, Outcome.LOST in outcomes
-    if won or lost:
-        return Outcome.MIXED if won and lost else Outcome.WON if won else Outcome.LOST
-    return Outcome.NEITHER if Outcome.NEITHER in outcomes else Outcome.FEW
+def _joint(outcomes: set[Outcome]) -> frozenset[Outcome]:
+    decided = outcomes & {Outcome.WON, Outcome.LOST}
+    return frozenset(decided or (outcomes & {Outcome.NEITHER}) or outcomes)

@@ -131,6 +131,15 @@ def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path
     assert "remove it, and the flight is flown again" in capsys.readouterr().err
 
 
+def test_traces_of_another_configuration_are_flown_anew(flown, monkeypatch):
+    monkeypatch.setattr("sim.sweep.again.outcome", sim.sweep.flying.outcome)
+    words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
+    main([*words, "--traces"])
+    count = len(flown)
+    main([*words, "--again", "--world", "harsh"])
+    assert len(flown) == 2 * count > 0
+
+
 def test_all_cut_short_still_reports_what_was_flown(flown, monkeypatch, capsys):
     whole = sim.sweep.flying.fly
 

@@ -9,7 +9,8 @@ import pytest
 from sim.experiments import FAIR
 from sim.experiments.design import Choice, design
 from sim.experiments.fair.__main__ import Fields, page
-from sim.experiments.fair.comparison import OWN, Outcome, comparisons, grouped
+from sim.experiments.fair.comparison import OWN, comparisons, grouped, opponent_name
+from sim.experiments.opponent import Outcome
 from sim.experiments.spec import experiment
 from sim.rivals import MPC
 from sim.sweep.mixed import CROSSED, law_and_gains
@@ -50,22 +51,27 @@ def test_the_mixed_model_separates_law_and_gains():
 
 
 def test_a_larger_error_of_the_opponent_is_a_win_and_the_group_counts_once():
-    found = comparisons(flights(0.8, 0.0))
-    assert not {each.opponent for each in found} & set(OWN)
-    path = [each for each in found if each.group == "path" and each.opponent == ("paper", "standard")]
+    found, analytic = comparisons(flights(0.8, 0.0)), opponent_name("paper", "standard")
+    opponents = {opponent_name(*law) for law in LAWS if law not in OWN}
+    assert {each.opponent for each in found} == opponents
+    path = [each for each in found if each.metric.startswith("path") and each.opponent == analytic]
     assert len(path) == 4 and {each.outcome for each in path} == {Outcome.WON}
-    groups = grouped(found)
-    assert [value for key, value in groups.items() if key[0] == ("paper", "standard") and key[2] == "path"] == [
-        Outcome.WON,
-        Outcome.WON,
-    ]
+    groups = {key: value for key, value in grouped(found).items() if key[0] == analytic and key[2] == "path"}
+    assert list(groups.values()) == [{Outcome.WON}, {Outcome.WON}]
     lost = grouped(comparisons(flights(-0.8, 0.0)))
-    assert {value for key, value in lost.items() if key[2] == "path"} == {Outcome.LOST}
+    assert {value for key, value in lost.items() if key[2] == "path"} == {frozenset({Outcome.LOST})}
+
+
+def test_a_group_that_is_better_and_worse_counts_as_both():
+    table = flights(0.8, 0.0).with_columns(path_rms_straight_m=1e-5 / pl.col("path_rms_m"))
+    groups = grouped(comparisons(table))
+    both = {value for key, value in groups.items() if key[0] == opponent_name("paper", "standard") and key[2] == "path"}
+    assert both == {frozenset({Outcome.WON, Outcome.LOST})}
 
 
 def test_flights_that_both_laws_complete_are_no_difference():
-    found = [each for each in comparisons(flights(0.0, 0.0)) if each.metric == "completed"]
-    assert found and {each.outcome for each in found} == {Outcome.NEITHER}
+    groups = grouped(comparisons(flights(0.0, 0.0)))
+    assert {value for key, value in groups.items() if key[2] == "completed"} == {frozenset({Outcome.NEITHER})}
 
 
 def test_the_page_has_every_number_from_the_table():
