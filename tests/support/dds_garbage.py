@@ -5,6 +5,7 @@ that are no message of the type, so those are injected: RTPS packets in the name
 broken payloads, and stray datagrams.
 
     python dds_garbage.py DOMAIN PACKETS RATE_HZ     prints the packets sent of each kind as one line of JSON
+    python dds_garbage.py DOMAIN                     sends as many as each line of standard input says, and prints them
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def broken(rng: random.Random) -> bytes:
 def wrong(role: str, rng: random.Random) -> Any:
     """A message of the right type with content of no use; None where a topic has none."""
     now = time.time_ns()
-    stamp = rng.choice((0, now - 10**12, now + 10**9, 2**60))
+    stamp = rng.choice((0, now - 10**12, now + 10**12, 2**60))
     bad = rng.choice((np.nan, np.inf, -np.inf))
     if role == "wrench":
         value = samples.to_wrench(now, np.full(6, bad), "flu", "tool")
@@ -87,34 +88,55 @@ def oversized() -> Any:
     return image
 
 
-def main() -> None:
-    domain, packets, rate_hz = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
-    rng, part, injector = random.Random(0), Participant(domain), Injector(domain)
-    topics = subscriptions(BridgeConfig(domain_id=domain))
-    # Two writers a topic: a reader takes nothing older than the numbers that are injected in a writer's name.
-    writers = {each.role: (part.writer(*each[1:3]), part.writer(*each[1:3]), each.type_name) for each in topics}
-    time.sleep(1.5)  # discovery
-    sent, begin = {"written": 0, "injected": 0, "stray": 0}, time.monotonic()
-    for index in range(packets):
-        role = rng.choice([*writers, "stray"])
+class Garbage:
+    """Everything of no use, in a random order that is always the same; `sent` counts the packets of each kind."""
+
+    def __init__(self, domain: int) -> None:
+        self._rng, part, self._injector = random.Random(0), Participant(domain), Injector(domain)
+        topics = subscriptions(BridgeConfig(domain_id=domain))
+        # Two writers a topic: a reader takes nothing older than the numbers that are injected in a writer's name.
+        self._writers = {
+            each.role: (part.writer(*each[1:3]), part.writer(*each[1:3]), each.type_name) for each in topics
+        }
+        self.sent = {"written": 0, "injected": 0, "stray": 0}
+        time.sleep(1.5)  # discovery
+
+    def send(self) -> None:
+        """Send one packet."""
+        rng, index = self._rng, sum(self.sent.values())
+        role = rng.choice([*self._writers, "stray"])
         if role == "stray":
             head = rng.choice((RTPS, RTPS[:4], b""))
-            injector.stray(head + rng.randbytes(rng.randrange(0, 1400)))
-            sent["stray"] += 1
+            self._injector.stray(head + rng.randbytes(rng.randrange(0, 1400)))
+            self.sent["stray"] += 1
+            return
+        writer, victim, name = self._writers[role]
+        value = wrong(role, rng) if rng.random() < 0.5 else None
+        value = oversized() if value is not None and index % OVERSIZED == 0 and name.endswith("Image") else value
+        if value is None:
+            self._injector.inject(victim, broken(rng))
+            self.sent["injected"] += 1
         else:
-            writer, victim, name = writers[role]
-            value = wrong(role, rng) if rng.random() < 0.5 else None
-            value = oversized() if value is not None and index % OVERSIZED == 0 and name.endswith("Image") else value
-            if value is None:
-                injector.inject(victim, broken(rng))
-                sent["injected"] += 1
-            else:
-                writer.write_bytes(encoded(value, name))
-                sent["written"] += 1
+            writer.write_bytes(encoded(value, name))
+            self.sent["written"] += 1
+
+
+def main() -> None:
+    garbage = Garbage(int(sys.argv[1]))
+    if len(sys.argv) == 2:
+        for line in sys.stdin:
+            for _ in range(int(line)):
+                garbage.send()
+            print(json.dumps(garbage.sent), flush=True)
+        return
+    packets, rate_hz = int(sys.argv[2]), float(sys.argv[3])
+    begin = time.monotonic()
+    for index in range(packets):
+        garbage.send()
         if (early := begin + index / rate_hz - time.monotonic()) > BURST_S:
             time.sleep(early)
     time.sleep(0.5)
-    print(json.dumps(sent))
+    print(json.dumps(garbage.sent))
 
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ def fly(
     """
     (folder / "bridge.toml").write_text(f"domain_id = {number}\n")
     here, first = ROOT / "tests" / "support", first_in_line()
-    lasting = str(plan["duration_s"] + plan.get("wait_s", 40.0) + 20.0)
+    lasting = str(plan["duration_s"] + plan.get("wait_s", 90.0) + 20.0)
     bridge = [sys.executable, "-m", "sim.commands.cli", "bridge", "--config", str(folder / "bridge.toml")]
     bridge += ["--duration", lasting, *(["--json"] if as_json else [])]
     stand_in = [sys.executable, str(here / "px4_stand_in.py"), json.dumps(plan | {"domain": number})]
@@ -98,6 +98,14 @@ def fly(
         flying.terminate()  # as Ctrl-C
         lines = flying.communicate(timeout=30)[0].splitlines()
     return Flown(seen=seen, lines=lines, garbage=sent)
+
+
+def fly_in_lock_step(number: int, packets: int, **plan: Any) -> dict[str, Any]:
+    """Report of bridge and stand-in in one process, with so many packets of garbage a tick from another."""
+    script = ROOT / "tests" / "support" / "px4_lock_step.py"
+    command = [sys.executable, str(script), str(packets), json.dumps(plan | {"domain": number})]
+    with _process(command) as process:
+        return json.loads(process.communicate()[0])
 
 
 @contextlib.contextmanager

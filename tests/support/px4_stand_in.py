@@ -14,6 +14,7 @@ import math
 import multiprocessing
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +48,7 @@ SHAPE, FOCAL, CENTRE = (240, 424), 312.6, (211.5, 119.5)
 #: Board: left, right, upper and lower edge from the start of the tip [m], wall behind it [m], grey levels of both.
 BOARD, GAP, GREYS = (-8.0, 0.05, -0.60, 0.05), 0.05, (190.0, 70.0)
 CURVE = ThrustCurve(quadratic=0.0)
+RATE_HZ = 250.0
 
 
 @dataclass(kw_only=True)
@@ -57,7 +59,7 @@ class Plan:
     duration_s: float  # at most
     away_m: float = math.inf  # ends the run: distance of the tip after the first contact
     loss_timeout_s: float = 0.3  # COM_OF_LOSS_T
-    wait_s: float = 40.0  # longest wait for proof of life
+    wait_s: float = 90.0  # longest wait for proof of life
     silent_at_s: float = math.nan  # the inertial data stop
     leave_at_s: float = math.nan  # the operator leaves Offboard mode
     picture_hz: float = 15.0
@@ -127,33 +129,53 @@ class Camera:
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=(FOCAL, FOCAL, *CENTRE), stamp_ns=stamp_ns)
 
 
+class CameraTopics:
+    """Publishes pictures of a pose."""
+
+    def __init__(self, part: Participant, camera: Camera) -> None:
+        topics = Px4Topics()
+        self._camera = camera
+        self._color, self._depth = part.writer(topics.color, IMAGE), part.writer(topics.depth, IMAGE)
+        self._info = part.writer(topics.camera_info, CAMERA_INFO)
+
+    def publish(self, position: np.ndarray, attitude: np.ndarray, stamp_ns: int) -> None:
+        picture = self._camera.picture(position, attitude, stamp_ns)
+        self._info.write(pictures.from_intrinsics(picture.intrinsics, SHAPE, stamp_ns))
+        self._color.write(pictures.from_rgb(picture.rgb, stamp_ns))
+        self._depth.write(pictures.from_depth(picture.depth, stamp_ns))
+
+
 def run_camera(domain: int, rate_hz: float, camera: Camera, pose: Any) -> None:
     """Publish pictures of the pose, position and quaternion, that the parent process writes, as long as it lives."""
-    parent = multiprocessing.parent_process()
-    part, topics = Participant(domain), Px4Topics()
-    color, depth = part.writer(topics.color, IMAGE), part.writer(topics.depth, IMAGE)
-    info = part.writer(topics.camera_info, CAMERA_INFO)
+    parent, topics = multiprocessing.parent_process(), CameraTopics(Participant(domain), camera)
     while parent is None or parent.is_alive():
         begin, stamp = time.monotonic(), time.time_ns()
         with pose.get_lock():
             now = np.array(pose[:])
-        picture = camera.picture(now[:3], now[3:], stamp)
-        info.write(pictures.from_intrinsics(picture.intrinsics, SHAPE, stamp))
-        color.write(pictures.from_rgb(picture.rgb, stamp))
-        depth.write(pictures.from_depth(picture.depth, stamp))
+        topics.publish(now[:3], now[3:], stamp)
         time.sleep(max(0.0, 1.0 / rate_hz - (time.monotonic() - begin)))
 
 
 class StandIn:
-    """Publishes and receives once a tick."""
+    """Publishes and receives once a tick.
 
-    def __init__(self, plan: Plan) -> None:
+    Args:
+        plan: What happens.
+        clock: Clock of the stamps [ns] of a flight in lock-step, whose pictures are then drawn within the tick; None is
+            that of the computer, with the camera in a process of its own.
+    """
+
+    def __init__(self, plan: Plan, clock: Callable[[], int] | None = None) -> None:
         self.plan, self.px4, self.vehicle = plan, Px4(plan), Vehicle(distance=0.3)
+        self._clock, self._camera = clock or time.time_ns, None
         self._pose = multiprocessing.Array("d", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         camera = Camera(self.vehicle.wall, self.vehicle.vehicle.camera_position_m)
-        arguments = plan.domain, plan.picture_hz, camera, self._pose
-        multiprocessing.Process(target=run_camera, args=arguments, daemon=True).start()
         part, topics = Participant(plan.domain), Px4Topics()
+        if clock is None:
+            arguments = plan.domain, plan.picture_hz, camera, self._pose
+            multiprocessing.Process(target=run_camera, args=arguments, daemon=True).start()
+        else:
+            self._camera = CameraTopics(part, camera)
         self._imu = part.writer(topics.imu, SENSOR_COMBINED)
         self._attitude = part.writer(topics.attitude, VEHICLE_ATTITUDE)
         self._wrench = part.writer(topics.wrench, WRENCH)
@@ -165,7 +187,7 @@ class StandIn:
         self._ticks, self.left, self._touched = 0, False, False
 
     def tick(self, now_ns: int) -> bool:
-        now_s, stamp = now_ns * 1e-9, time.time_ns()
+        now_s, stamp = now_ns * 1e-9, self._clock()
         self._first = now_s if self._first is None else self._first
         self._receive(now_s)
         self._switch(now_s, stamp // 1000)
@@ -232,6 +254,8 @@ class StandIn:
             self._mode.write(control_mode(us, armed=self.px4.engaged, offboard=self.px4.engaged))
         with self._pose.get_lock():
             self._pose[:] = [*vehicle.position, *vehicle.attitude.as_quat()]
+        if self._camera and self._ticks % round(RATE_HZ / self.plan.picture_hz) == 0:
+            self._camera.publish(vehicle.position, vehicle.attitude.as_quat(), stamp)
 
     def report(self) -> dict[str, Any]:
         """What PX4 saw."""
@@ -265,7 +289,7 @@ def control_mode(us: int, *, armed: bool, offboard: bool) -> Any:
 
 def main() -> None:
     stand_in = StandIn(Plan(**json.loads(sys.argv[1])))
-    timing = run(stand_in.tick, 250.0)
+    timing = run(stand_in.tick, RATE_HZ)
     print(json.dumps(stand_in.report() | {"left_out": timing.left_out, "ticks": timing.ticks}))
 
 

@@ -19,6 +19,8 @@ RATE, LATE_MS, SILENT_MS = 250.0, 1e3 * SafetySettings().imu_age_s, 1e3 * Bridge
 #: Both rows are painted after 36 s where the first picture shows the edge beside the beginning, else after 58 to 60 s,
 #: and one flight in four paints one of them again [s]; distance of the tip after the retreat [m].
 PAINTED_S, AWAY_M = 130.0, 0.3
+#: Packets of garbage a tick.
+PACKETS = 5
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,14 +76,12 @@ def test_the_operator_takes_over(tmp_path: Path, domain: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_minute_through_a_hundred_thousand_packets(tmp_path: Path, domain: int) -> None:
-    plan = {"duration_s": PAINTED_S, "away_m": AWAY_M}
-    flown = dds_loopback.fly(tmp_path, domain, garbage=(100_000, 1700.0), as_json=True, **plan)
-    seen = flown.seen
-    print(seen, flown.garbage, flown.lines)
-    # Other tests run beside this one, so commands may be late, but never for as long as the link may be silent;
-    # benchmarks/bridge.py shows rate and age on an otherwise idle computer.
-    assert seen["span_s"] > 30.0 and seen["commands"] >= 0.9 * RATE * seen["span_s"]
-    assert seen["age_ms"][-1] <= SILENT_MS and seen["gap_ms"][-1] <= SILENT_MS
-    assert sum(flown.garbage.values()) == 100_000 and seen["failsafe_s"] is None
+@pytest.mark.timeout(600)
+def test_paints_through_a_hundred_thousand_packets(domain: int) -> None:
+    seen = dds_loopback.fly_in_lock_step(domain, PACKETS, duration_s=PAINTED_S, away_m=AWAY_M)
+    print(seen)
+    assert seen["span_s"] > 30.0 and seen["commands"] >= 0.99 * RATE * seen["span_s"]
+    assert sum(seen["garbage"].values()) >= 100_000 and min(seen["garbage"].values()) > 10_000
+    assert {reason.split(":")[0] for reason in seen["ignored"]} >= {"imu", "attitude", "wrench", "color", "depth"}
+    assert seen["failsafe_s"] is None and seen["safety"].strip() == "nominal"
     assert abs(seen["moved_m"][1]) < 0.5 and seen["distance_m"] > AWAY_M  # both rows painted, and away from the wall
