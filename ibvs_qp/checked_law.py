@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.turned_camera import TurnedCamera
-from ibvs_qp.flight_state import FlightState, put_state, take_state
+from ibvs_qp.flight_state import FlightState, copied, put_state, take_state
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -72,6 +73,14 @@ class CheckedLaw(ABC):
             ConfigError: When it is of another class, configuration, tasks or limits.
         """
         put_state(self, self.initial_config, state)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built anew from the arguments, and continue from the state."""
+        return copied, (functools.partial(type(self), *self._arguments()[0], **self._arguments()[1]), self.state())
+
+    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """Arguments that build it; a subclass with others has its own."""
+        return (self.initial_config,), {}
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(

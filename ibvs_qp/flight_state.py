@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,6 +74,13 @@ def put_state(root: Any, config: Any, state: FlightState) -> None:
             part.load_memory(values)
         else:
             vars(part).update(values)
+
+
+def copied(make: Callable[[], Any], state: FlightState) -> Any:
+    """A pilot or controller built anew, in a state."""
+    made = make()
+    made.restore(state)
+    return made
 
 
 def _parts(root: Any) -> dict[str, Any]:

@@ -20,6 +20,7 @@ MOVED = {
     "ibvs_qp.painting": "ibvs_qp.pilot.painting",
     "ibvs_qp.presets": "ibvs_qp.pilot.presets",
     "ibvs_qp.recording": "ibvs_qp.interfaces.log",
+    "ibvs_qp.ros.held": "ibvs_qp.interfaces.ros.latest_samples",
     "ibvs_qp.ros": "ibvs_qp.interfaces.ros",
 }
 

@@ -109,7 +109,7 @@ def parse_toml(content: bytes | str, place: str | Path) -> dict[str, Any]:
         ConfigError: When it is no TOML in UTF-8, is nested too deep, or has an integer beyond 64 bits.
     """
     try:
-        text = content.decode() if isinstance(content, bytes) else content
+        text = content.decode("utf-8-sig") if isinstance(content, bytes) else content  # a mark of Windows editors
         if _DEEP_KEY.search(text):
             raise RecursionError
         table = tomllib.loads(text)

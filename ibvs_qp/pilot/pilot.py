@@ -19,7 +19,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.estimator import INERTIAL
 from ibvs_qp.estimation.turned_camera import straightened
-from ibvs_qp.flight_state import FlightState, put_state, take_state
+from ibvs_qp.flight_state import FlightState, copied, put_state, take_state
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.pilot.camera import CameraInput
@@ -88,7 +88,7 @@ class Pilot:
         controller: Control law, for studies of other laws; None builds the configured one.
     """
 
-    CONSTANTS = ("observer", "_commanded")
+    CONSTANTS = ("observer", "_commanded", "_seen_as")
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class Pilot:
         seen_as: Callable[[FeatureFrame], FeatureFrame] | None = None,
         controller: Controller | None = None,
     ) -> None:
-        self.config = config = config or PilotConfig()
+        self.config, self._seen_as = (config := config or PilotConfig()), seen_as
         settings, vehicle = config.controller, config.controller.vehicle
         self._gate, self._limits = SensorGate(config.camera.latest_s), ThrustLimits(vehicle.geometry.count)
         self.estimation = estimation = Estimation(config, self._gate)
@@ -136,6 +136,11 @@ class Pilot:
         self.measurement: Measurement | None = None
         self.reference = Reference()
         self.controller_time_s = 0.0
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built anew and continue from the state; the observer stays with the original."""
+        arguments = self.config, self.painter, self._seen_as, self.controller
+        return copied, (functools.partial(type(self), *arguments), self.state())
 
     def state(self) -> FlightState:
         """Everything that changes from tick to tick; `restore` of this or an equal pilot continues from it.

@@ -41,6 +41,8 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def decorate(function: Callable[..., Any]) -> Any:
         compiled = inner(function)
+        if compiled is function:  # NUMBA_DISABLE_JIT=1, to debug or to measure coverage: slow, the same numbers
+            return compiled
         with contextlib.suppress(RuntimeError):  # neither the package nor the user's cache folder can be written
             compiled.enable_caching()
         for index in _stored(compiled):

@@ -143,7 +143,7 @@ class ExperimentCommand:
             )
             lead = ("A quick run with few flights, not the record: " if self.quick else "") + lead
             with working(notes, "Drawing the figures ..."):
-                page = write_page(folder, experiments, table, lead, self._repeat(), title)
+                page = write_page(folder, experiments, table, lead, self._repeat())
         content["wall_time_s"] = time.perf_counter() - started
         write_summary(folder, content)
         if self.json:

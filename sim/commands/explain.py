@@ -32,8 +32,8 @@ class Explain:
     Example: ibvs-qp explain runs/2026-11-21T10-00-00 --at 12.3
     """
 
-    run_dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
-    """Run folder of a flight under the QP law."""
+    run_dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN_OR_LOG")]
+    """Run folder of a flight under the QP law, or an MCAP log of your own loop or of ``replay BAG`` (docs/logs.md)."""
     at: float
     """Time of the tick since the start [s]."""
     seed: Annotated[int | None, optional("INT")] = None
@@ -74,6 +74,10 @@ class Explain:
         from sim.flight.flight_log import load_run
         from sim.flight.unfinished import JOURNALS
 
+        if self.run_dir.is_file():
+            from sim.evaluate.logged_tick import logged_tick
+
+            return logged_tick(self.run_dir, self.at)
         if not (self.run_dir / "log.npz").exists() and not any(self.run_dir.glob(f"{JOURNALS}*")):
             raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
@@ -89,6 +93,8 @@ class Explain:
 
     def _tick(self, trace: Trace) -> int:
         first, last = float(trace.t[0]), float(trace.t[-1])
+        if self.run_dir.is_file():
+            return 0
         if not first - 1e-6 <= self.at <= last + 1e-6:
             raise IbvsQpError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")
         return int(np.argmin(np.abs(trace.t - self.at)))

@@ -1,4 +1,4 @@
-"""``ibvs-qp replay``: a recorded controller on its recorded inputs, or another preset on them."""
+"""``ibvs-qp replay``: a recorded controller on its recorded inputs, another preset on them, or a pilot on a bag."""
 
 from __future__ import annotations
 
@@ -21,15 +21,25 @@ NOTHING = "Nothing was compared: the log has no ticks up to its first gap."
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ReplayCommand:
-    """Run the recorded controller on the inputs of a log: bit-identical commands, or the first difference.
+    """Run the recorded controller on the inputs of a log, or the pilot on a ROS 2 bag.
+
+    A log gives bit-identical commands, or the first difference; a bag its phases, refusals and counts, and a log.
 
     Example: ibvs-qp replay runs/one/flight_qp.mcap --preset tarot_t960_paper
+
+    Example: ibvs-qp replay my_bag --topics topics.toml --vehicle my_vehicle.toml
     """
 
-    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG")]
-    """MCAP log of paint --log mcap, or of ibvs_qp.interfaces.log.Recorder; also the log of a killed process."""
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG_OR_BAG")]
+    """MCAP log of paint --log mcap, or of ibvs_qp.interfaces.log.Recorder, also of a killed process; or a ROS 2 bag."""
     preset: Annotated[Path | None, optional("FILE")] = None
-    """Preset file (TOML), or a shipped one: show its commands on the same inputs instead."""
+    """Preset file (TOML), or a shipped one: of a log, show its commands instead; of a bag, the pilot's."""
+    topics: Annotated[Path | None, optional("FILE")] = None
+    """Topics of the bag (TOML, docs/bags.md); default: /imu/data, /ft_sensor/wrench and those of a RealSense."""
+    vehicle: Annotated[Path | None, optional("FILE")] = None
+    """Vehicle of the bag in place of the preset's: as of ``ibvs-qp vehicle``."""
+    out: Annotated[Path | None, optional("DIR")] = None
+    """Run folder of a bag; default: runs/<UTC stamp>."""
     repair: Annotated[Path | None, optional("FILE")] = None
     """Write the log again with its end and index, for viewers that refuse the log of a killed process."""
     json: Annotated[bool, flag] = False
@@ -37,6 +47,37 @@ class ReplayCommand:
 
     def run(self, words: list[str]) -> int:
         """Replay and print."""
+        from ibvs_qp.interfaces.ros.recording import is_bag
+
+        return self._bag() if is_bag(self.log) else self._log()
+
+    def _bag(self) -> int:
+        from rich.console import Console
+
+        from ibvs_qp.pilot import PilotConfig
+        from sim.commands.replay_bag import bag_text, fly_bag, read_topics, summary
+        from sim.flight.working import working
+        from sim.report.rundir import RunFolder, as_json, write_json
+        from sim.vehicles.configuration import with_vehicle
+        from sim.vehicles.vehicle_file import read_vehicle
+
+        if self.repair is not None:
+            raise ConfigError("--repair is for logs of ibvs_qp; a bag that was cut is read up to its end")
+        topics, file = read_topics(self.topics), preset_file(self.preset)
+        config = PilotConfig() if file is None else PilotConfig.from_toml(file)
+        vehicle = preset_file(self.vehicle, "--vehicle", other_formats=True)
+        if vehicle is not None:
+            config = with_vehicle(config, read_vehicle(vehicle).vehicle)
+        with RunFolder.open(self.out) as folder:
+            log = folder.path / "bag.mcap"
+            with working(Console(stderr=True, quiet=self.json), "Flying the bag ..."):
+                found = fly_bag(self.log, topics, config, log)
+            content = summary(self.log, log, found)
+            write_json(folder.path / "bag.json", content)
+        print(as_json(content) if self.json else "\n".join([*bag_text(found), f"Log: {log}"]))
+        return 0
+
+    def _log(self) -> int:
         from rich.console import Console
 
         from ibvs_qp.interfaces.log import compare_preset, read_log, repair, replay

@@ -1,67 +1,196 @@
-"""The results page as Markdown, verdict first; all numbers come from the tables."""
+"""The results page of flown experiments from its template; every number is a field of `Fields`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import polars as pl
 
-from sim.experiments.criteria_section import criteria_section
-from sim.experiments.impedance_section import impedance_section
-from sim.experiments.parts_section import parts_section, rivals_section
-from sim.experiments.published_section import published_section, rates_section
-from sim.experiments.tables import Section
-from sim.experiments.verdict_section import verdict_section
-from sim.sweep.statistics import false_claims
+from sim.evaluate.figures import figure_of
+from sim.evaluate.table import markdown
+from sim.experiments.comparison import Comparison, Outcome, comparisons, grouped, opponent_name
+from sim.experiments.spec import Experiment
+from sim.experiments.variants import VARIANTS
+from sim.experiments.verdict import Verdict, verdicts
+from sim.experiments.wording import cell, entry, headings, interval, measured, value_of
+from sim.flight.trace import law_name
+from sim.sweep.mixed import Ratio, law_and_gains
+from sim.sweep.paired import exact_interval
+from sim.sweep.statistics import cells, false_claims, needed, parameters, select, split
 
-#: Experiment whose figure gives the overview.
-_OVERVIEW = "worlds"
-
-
-def _claims(tables: Sequence[pl.DataFrame]) -> str:
-    """How many flights were checked by the truth, and how many of them the pilot claims wrongly."""
-    checked = sum(table["claimed"].count() for table in tables if "claimed" in table.columns)
-    text = ""
-    if checked:
-        claims = sum(map(false_claims, tables))
-        text = f"False claims (claimed by the pilot, not completed by the truth): {claims} of {checked} flights.\n"
-    if older := sum(map(len, tables)) - checked:
-        text += (
-            f"{older} flights are older than the assessment by the truth: they *ended as planned* by the pilot's claim "
-            "([experiments](../experiments.md) has them scored again by their figures).\n"
-        )
-    return text
+TEMPLATE = Path(__file__).with_name("page.md.jinja")
+#: The QP as shipped.
+QP = ("qp", "standard")
 
 
-def results_page(sections: Sequence[Section], lead: str, command: str, name: str) -> str:
+class Fields:
+    """Numbers and tables of one experiment.
+
+    Args:
+        experiment: The experiment.
+        table: Its flights.
+        figures: Caption and file of each figure; files are relative to the page.
+    """
+
+    #: Figures of the mixed model: those of jobs that paint or slide.
+    MODELLED = ("path_rms_m", "force_rms_n", "tilt_peak_deg", "yaw_peak_deg")
+
+    def __init__(
+        self, experiment: Experiment, table: pl.DataFrame, figures: Mapping[str, tuple[str, Path]] | None = None
+    ) -> None:
+        self.experiment, self.table, self.figures = experiment, table, dict(figures or {})
+        self._found = comparisons(experiment, table)
+        self._groups = grouped(self._found)
+
+    @property
+    def cells(self) -> list[dict[str, Any]]:
+        """Parameters of every cell, in the order of the table."""
+        return [parameters(key) for key, _ in split(self.table, ("experiment",))]
+
+    @property
+    def laws(self) -> list[tuple[str, str]]:
+        """Law and variant of every opponent of the QP: laws in its place, not parts or gains of its own."""
+        flown = sorted(self.table.select("law", "variant").unique().rows())
+        return [(law, variant) for law, variant in flown if law != "qp" or VARIANTS[variant].controller]
+
+    @property
+    def opponents(self) -> list[str]:
+        """Names of everything that was compared."""
+        return list(dict.fromkeys(each.opponent for each in self._found))
+
+    @property
+    def variants(self) -> dict[str, str]:
+        """Variants flown, with their descriptions."""
+        flown = set(self.table["variant"].unique())
+        return {name: variant.words for name, variant in VARIANTS.items() if name in flown}
+
+    @property
+    def lost(self) -> list[Comparison]:
+        """Figures in which the QP is worse than a law in its place, in the order of the cells."""
+        names = {opponent_name(*each) for each in self.laws}
+        return [each for each in self._found if each.outcome is Outcome.LOST and each.opponent in names]
+
+    @property
+    def decided(self) -> list[Comparison]:
+        """Figures in which the QP is better or worse."""
+        return [each for each in self._found if each.outcome in (Outcome.WON, Outcome.LOST)]
+
+    def name(self, law: str, variant: str) -> str:
+        """Name of a law with its variant."""
+        return opponent_name(law, variant)
+
+    def count(self, name: str, *outcomes: str) -> int:
+        """Groups of figures against an opponent that have exactly these outcomes (names of `Outcome`)."""
+        sought = {Outcome[each] for each in outcomes}
+        return sum(1 for key, value in self._groups.items() if key[0] == name and value == sought)
+
+    def figure(self, metric: str) -> str:
+        """Name of a figure."""
+        return figure_of(metric).label
+
+    def median(self, metric: str, law: str, variant: str = "standard", **params: Any) -> str:
+        """Median of a figure over the flights that ended as planned, with its unit."""
+        figure, rows = figure_of(metric), self._rows(law, variant, params).filter(pl.col("completed"))
+        values = rows[metric].drop_nulls().to_numpy()
+        return f"{figure.scale * np.median(values):.3g} {figure.unit}".rstrip() if len(values) else "–"
+
+    def gap(self, metric: str, law: str, variant: str = "standard", **params: Any) -> str:
+        """Figure of an opponent minus that of the QP, paired, with its exact interval."""
+        figure = figure_of(metric)
+        both = self._rows(*QP, params).join(self._rows(law, variant, params), on="seed", suffix=".second")
+        both = both.filter(pl.col("completed") & pl.col("completed.second"))
+        values = figure.scale * (both[f"{metric}.second"] - both[metric]).drop_nulls().to_numpy()
+        if not len(values):
+            return "–"
+        low, high = exact_interval(values)
+        return f"{np.median(values):+.3g} ({low:+.3g} to {high:+.3g}) {figure.unit}".rstrip()
+
+    def done(self, law: str, variant: str, **params: Any) -> str:
+        """Flights that ended as planned, of all."""
+        rows = self._rows(law, variant, params)
+        return f"{rows['completed'].sum()} of {rows.height}"
+
+    def held(self, law: str, variant: str, **params: Any) -> str:
+        """Slides held, of all flights; empty for a cell that does not slide."""
+        rows = self._rows(law, variant, params)
+        slides = rows["slide_held"].drop_nulls() if "slide_held" in rows.columns else []
+        return f", held {int(sum(slides))} of {rows.height}" if len(slides) else ""
+
+    def mixed(self, metric: str) -> dict[str, Ratio]:
+        """Effects of law and gains by the mixed model."""
+        return dict(law_and_gains(self.table, metric))
+
+    def cell_text(self, params: Mapping[str, Any]) -> str:
+        """A cell in words."""
+        return cell(self.experiment, params) or "all"
+
+    def cell_table(self) -> str:
+        """Medians with their intervals of every cell that no figure shows in its place."""
+        experiment, columns = self.experiment, measured(self.experiment, self.table)
+        heads = [*experiment.params.values(), "variant", "law", "done", *headings(columns)]
+        rows, folded = [], 0
+        for flown in cells(self.table, {column.metric for column in columns if column.of_all}):
+            if experiment.is_folded(flown["params"]):
+                folded += 1
+                continue
+            row = [entry(flown["params"].get(name, "")) for name in experiment.params]
+            row += [flown["variant"], law_name(flown["law"]), f"{flown['completed']} of {flown['n']}"]
+            values = ((value_of(flown["metrics"], column, flown["params"]), column) for column in columns)
+            rows.append(
+                row + [interval(value, column, flown["counts"].get(column.metric, 0)) for value, column in values]
+            )
+        more = f"\n{folded} more cells are in the figure and in the table of flights.\n" if folded else ""
+        return markdown(heads, rows) + more
+
+    def bound_table(self) -> str:
+        """Every bound of the QP law with the flown figure; empty without bounds."""
+        heads = ("figure", "cell", "bound", "median", "worst flight", "flights within", "met")
+        found = verdicts(self.experiment, self.table)
+        return markdown(heads, [_bound(self.experiment, each) for each in found]) if found else ""
+
+    def failures(self) -> list[str]:
+        """Flights that did not end as planned: law, cell, seeds and reason."""
+        lines = []
+        for key, rows in split(self.table.filter(~pl.col("completed")), ("law", "variant", "reason")):
+            seeds, where = ", ".join(map(str, sorted(rows["seed"]))), self.cell_text(parameters(key))
+            lines.append(f"{opponent_name(key['law'], key['variant'])}, {where}, seeds {seeds}: {key['reason']}")
+        return lines
+
+    def _rows(self, law: str, variant: str, params: Mapping[str, Any]) -> pl.DataFrame:
+        return select(self.table, params, law=law, variant=variant)
+
+
+def _bound(experiment: Experiment, verdict: Verdict) -> list[str]:
+    criterion = verdict.criterion
+    unit = f" {criterion.unit}" if criterion.unit else ""
+    sign = (">=" if criterion.least else "<=") + (" every" if criterion.every and criterion.share == 1.0 else "")
+    share = f" in {100.0 * criterion.share:.0f} %" if criterion.every and criterion.share < 1.0 else ""
+    where = cell(experiment, verdict.place) or "all"
+    where += f", {criterion.variant}" if criterion.variant != "standard" else ""
+    values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
+    met = "**no**" if verdict.words == "no" else verdict.words
+    bound, within = f"{sign} {verdict.bound:.4g}{unit}{share}", f"{verdict.within} of {verdict.n}"
+    return [criterion.text, where, bound, *values, within, met]
+
+
+def render(template: Path, **values: Any) -> str:
+    """Text of a template; a missing value is an error."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False)  # nosec
+    return environment.from_string(template.read_text(encoding="utf-8")).render(**values)
+
+
+def results_page(flown: Sequence[Fields], lead: str, command: str) -> str:
     """Markdown text of the page.
 
     Args:
-        sections: The flown experiments.
+        flown: The flown experiments.
         lead: A sentence on the flights.
         command: Command that repeats one experiment, with ``{name}`` in the place of its name.
-        name: Of the flights: an experiment, or "all".
     """
-    flown = [(section.experiment, section.table) for section in sections]
-    text = (
-        f"# Results of the experiments\n\nGenerated from data by `{command.format(name=name)}`; do not edit. {lead}\n"
-        "[tables.md](tables.md) has every table and figure, [experiments.md](../experiments.md) describes the "
-        "experiments. All flights are simulated.\n"
-    )
-    text += _claims([table for _, table in flown])
-    if verdict := verdict_section(flown):
-        text += "\n## Verdict\n\n" + verdict
-    overview = [figure for section in sections if section.experiment.name == _OVERVIEW
-                for figure in section.figures.values()]  # fmt: skip
-    for caption, file in overview[:1]:
-        text += f"\n![{caption}]({file.as_posix()})\n\n*{caption}.*\n"
-    chapters = {
-        "Cost of weights and of a horizon of one tick": rivals_section(flown),
-        "Bounds": criteria_section(flown),
-        "Impedance against direct force control": "".join(
-            impedance_section(experiment, table) for experiment, table in flown if experiment.name == "force-hold"
-        ),
-        "Benefit of each part": parts_section(flown),
-        "Published flights and rates": "\n".join(filter(None, (published_section(flown), rates_section(flown)))),
-    }
-    return text + "".join(f"\n## {title}\n\n{chapter}" for title, chapter in chapters.items() if chapter)
+    claims = sum(false_claims(each.table) for each in flown)
+    return render(TEMPLATE, flown=flown, lead=lead, command=command, claims=claims, needed=needed())

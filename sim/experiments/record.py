@@ -1,4 +1,4 @@
-"""Files in the folder of an experiment: tables, summary, figures and the results page."""
+"""Files in the folder of an experiment: table, summary, figures and the results page."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ import polars as pl
 
 from sim.experiments import ALL
 from sim.experiments.figures import Results, draw
-from sim.experiments.page import results_page
+from sim.experiments.page import Fields, results_page
 from sim.experiments.spec import Experiment
-from sim.experiments.tables import Section, tables_page
-from sim.experiments.variants import REFERENCES
 from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.again import score_again
 from sim.sweep.design import Run
-from sim.sweep.paired import paired_differences, variant_differences
+from sim.sweep.paired import paired_differences
 from sim.sweep.parts import write_table
 from sim.sweep.statistics import cells, false_claims
 from sim.sweep.tables import read_tables
@@ -28,8 +26,8 @@ from sim.sweep.tables import read_tables
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.
 PARTS = "parts"
-#: The results page, and the tables behind it.
-PAGE, TABLES = "results.md", "tables.md"
+#: The results page.
+PAGE = "results.md"
 FIGURES = "figures"
 #: Facts of a run that the summary repeats.
 _FACTS = ("command", "version", "seed", "features", "world", "interrupted", "wall_time_s")
@@ -67,7 +65,6 @@ def summary(
         "false_claims": false_claims(table),
         "cells": listed,
         "differences": paired_differences(table) if table.height else [],
-        "parts": variant_differences(table, REFERENCES) if table.height else [],
         "verdicts": [
             _verdict_row(each.name, verdict) for each in experiments for verdict in verdicts(each, rows_of(table, each))
         ],
@@ -120,10 +117,8 @@ def write_summary(folder: Path, content: dict[str, Any]) -> None:
     write_json(folder / f"{content['name']}.json", content)
 
 
-def write_page(
-    folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str, name: str = ALL
-) -> Path:
-    """Draw every figure, remove those of earlier pages, write both pages; returns the file of the results page.
+def write_page(folder: Path, experiments: Sequence[Experiment], table: pl.DataFrame, lead: str, command: str) -> Path:
+    """Draw every figure, remove those of earlier pages, and write the results page; returns its file.
 
     Args:
         folder: Folder of the page, with logs in its ``parts``.
@@ -131,9 +126,8 @@ def write_page(
         table: Their rows.
         lead: A sentence on the flights.
         command: Command that repeats one experiment, with ``{name}`` in the place of its name.
-        name: Of the flights: an experiment, or "all".
     """
-    sections = []
+    flown = []
     with styled():
         for experiment in experiments:
             rows = rows_of(table, experiment)
@@ -143,10 +137,9 @@ def write_page(
             for title, (caption, figure) in draw(Results(experiment, rows, folder / PARTS)).items():
                 figures[title] = (caption, Path(FIGURES) / f"{title}.png")
                 save(figure, folder / figures[title][1])
-            sections.append(Section(experiment=experiment, table=rows, figures=figures))
-    shown = {folder / file for section in sections for _, file in section.figures.values()}
+            flown.append(Fields(experiment, rows, figures))
+    shown = {folder / file for fields in flown for _, file in fields.figures.values()}
     for file in set((folder / FIGURES).glob("*.png")) - shown:
         file.unlink()
-    write_text(folder / TABLES, tables_page(sections, lead, command, name))
-    write_text(folder / PAGE, results_page(sections, lead, command, name))
+    write_text(folder / PAGE, results_page(flown, lead, command))
     return folder / PAGE

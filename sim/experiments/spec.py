@@ -18,7 +18,7 @@ from ibvs_qp.config.settings import choice, load_toml, setting, validate
 from sim.evaluate.figures import FIGURES, figure_of
 from sim.experiments import ALL, FAIR, NAMES
 from sim.experiments.criteria import Criteria, Criterion
-from sim.experiments.variants import REFERENCES, VARIANTS, Variant
+from sim.experiments.variants import VARIANTS, Variant
 from sim.sweep.design import Parameter
 
 SPECS = Path(__file__).with_name("specs")
@@ -196,6 +196,5 @@ def experiment(name: str) -> Experiment:
         raise out_of_range("name", found.name, "", "allowed are letters, digits, - and _, and no name of a shipped one")
     _check_own(found)
     VARIANTS.update(found.variants)
-    REFERENCES.update({variant: own.against for variant, own in found.variants.items()})
     _own[found.name] = found
     return found

@@ -47,8 +47,6 @@ VARIANTS = {
     name: from_dict(Variant, table, name)
     for name, table in read_toml(Path(__file__).with_name("variants.toml")).items()
 }
-#: Reference variants of each variant.
-REFERENCES = {name: variant.against for name, variant in VARIANTS.items()}
 
 
 def with_force_gain(config: PilotConfig, factor: float) -> PilotConfig:

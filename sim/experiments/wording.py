@@ -9,38 +9,22 @@ import numpy as np
 import polars as pl
 
 from sim.experiments.spec import Column, Experiment
-from sim.sweep.paired import sign
-from sim.sweep.statistics import needed, spread
+from sim.sweep.statistics import spread
 
 
-def rounded(value: float, digits: int, plus: bool = False) -> str:
+def rounded(value: float, digits: int) -> str:
     """A number with `digits` decimals, without the sign of a rounded zero; a dash if it is not finite."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:.{digits}f}"
-    return text.lstrip("-") if float(text) == 0.0 else f"{value:+.{digits}f}" if plus else text
+    return text.lstrip("-") if float(text) == 0.0 else text
 
 
 def interval(value: Mapping[str, float] | None, column: Column, count: int) -> str:
     """Median of so many flights in the unit of a column, with its bootstrap interval, or minimum and maximum of few."""
-    return _interval(value, column, False, ("median", "low", "high"), count)
-
-
-def exact(value: Mapping[str, float] | None, column: Column) -> str:
-    """Median difference with its exact interval in the unit of a column, signed."""
-    return _interval(value, column, True, ("median", "sure_low", "sure_high"), needed())
-
-
-def difference(found: Mapping[str, float] | None, column: Column) -> str:
-    """A difference with its exact interval, bold if significant; the median alone if there are too few pairs."""
-    text = exact(found, column)
-    return f"**{text}**" if found is not None and column.better and sign(dict(found)) else text
-
-
-def _interval(value: Mapping[str, float] | None, column: Column, plus: bool, names: Sequence[str], count: int) -> str:
     if value is None or not np.isfinite(value["median"]):
         return "–"
-    middle, low, high = (rounded(column.scale * value[name], column.digits, plus) for name in names)
+    middle, low, high = (rounded(column.scale * value[name], column.digits) for name in ("median", "low", "high"))
     return middle if low == high or "–" in (low, high) else f"{middle} ({spread(low, high, count)})"
 
 

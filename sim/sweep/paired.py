@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -79,28 +79,4 @@ def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) 
         if found["flown"]:
             cell = {"experiment": key["experiment"], "variant": key["variant"], "params": parameters(key)}
             result.append(cell | found)
-    return result
-
-
-def variant_differences(
-    table: pl.DataFrame, references: Mapping[str, Sequence[str]], names: Sequence[str] | None = None
-) -> list[dict[str, Any]]:
-    """Each variant minus its reference, per law and parameters, seed by seed.
-
-    Args:
-        table: Rows of some variants.
-        references: Possible references of each variant; the first one in the same cell counts.
-        names: Figures to compare; None takes all.
-    """
-    result = []
-    for key, rows in split(table, ("experiment", "law")):
-        flown = {str(name): part for (name,), part in rows.group_by("variant", maintain_order=True)}
-        for variant, part in flown.items():
-            against = next((name for name in references.get(variant, ()) if name in flown and name != variant), None)
-            if against is None:
-                continue
-            found = differences(flown[against], part, names or figure_names(table))
-            if found["flown"]:
-                cell = {"experiment": key["experiment"], "law": key["law"], "variant": variant, "against": against}
-                result.append(cell | {"params": parameters(key)} | found)
     return result

@@ -16,6 +16,7 @@ import pytest
 from ibvs_qp.config.settings import from_dict
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.interfaces.px4.config import BridgeConfig
+from ibvs_qp.interfaces.ros.topics import Topics
 from ibvs_qp.pilot import PilotConfig
 from sim.commands import cli
 from sim.experiments.spec import Experiment
@@ -44,6 +45,7 @@ KINDS: dict[str, Callable[[dict[str, Any]], object]] = {
     "sweep": lambda table: parse_spec(table, ROOT),
     "experiment": lambda table: from_dict(Experiment, table),
     "bridge": lambda table: from_dict(BridgeConfig, table),
+    "topics": lambda table: from_dict(Topics, table),
     "fault rows": lambda table: [scenario(row) for row in table["row"]],
 }
 

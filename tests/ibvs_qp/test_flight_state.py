@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import multiprocessing
@@ -20,9 +21,24 @@ from ibvs_qp import Assured, Command, HybridController, PaperController, Pilot, 
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.flight_state import FlightState
+from ibvs_qp.model.model import Model
+from ibvs_qp.model.rows import Parameter, TaskRow
 from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.pilot.painting.strategy import Strategy
+from ibvs_qp.tasks import Task
 from tests.replay.cases import CASES
+
+
+class OwnRow(Task):
+    """A row of a user's: the first thrust stays near a target that may change."""
+
+    def __init__(self) -> None:
+        self._target = Parameter("own_thrust", 12.0)
+
+    def rows(self, model: Model) -> list[TaskRow]:
+        target = model.parameter(self._target)
+        return [TaskRow(name="own", unit="N", expression=model.thrust[0], target=target, weight=0.1)]
+
 
 #: Ticks for which a copy is compared.
 TICKS = 300
@@ -205,3 +221,22 @@ def test_what_cannot_continue_is_refused_and_changes_nothing() -> None:
         with pytest.raises(ConfigError, match=words):
             flown.restore(state)
         assert pickle.dumps(flown.state().values["" if isinstance(flown, Pilot) else "gate"]) == before, name
+
+
+@pytest.mark.parametrize("copy_of", [copy.deepcopy, lambda flown: pickle.loads(pickle.dumps(flown))])
+@pytest.mark.parametrize("kind", ["program", "analytic", "own row", "assured", "pilot"])
+def test_copies_and_pickles_continue(kind: str, copy_of: Callable[[Any], Any]) -> None:
+    """As for a process that is spawned: from its construction and in flight."""
+    config = CASES["rotor_loss"].config()
+    make: dict[str, Callable[[], Any]] = {
+        "program": lambda: HybridController(config.controller),
+        "analytic": lambda: PaperController(config.controller),
+        "own row": lambda: HybridController(config.controller, tasks=(OwnRow(),)),
+        "assured": lambda: Assured(HybridController(config.controller), SafetySettings(imu_age_s=0.05)),
+        "pilot": lambda: Pilot(config),
+    }
+    flown, step = make[kind](), replayed("rotor_loss")
+    for tick in range(40):
+        if tick in (0, 20):
+            other = copy_of(flown)
+        assert numbers(step(other, tick)) == numbers(step(flown, tick)), tick

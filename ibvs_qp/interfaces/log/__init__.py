@@ -5,7 +5,7 @@ from pathlib import Path
 from ibvs_qp.config.errors import ConfigError
 
 try:
-    from ibvs_qp.interfaces.log.comparison import Difference, PresetComparison, Replay, compare_preset, replay
+    from ibvs_qp.interfaces.log.comparison import Difference, PresetComparison, Replay, compare_preset, replay, replayed
     from ibvs_qp.interfaces.log.reader import RecordedFlight, read_log, repair
     from ibvs_qp.interfaces.log.recorder import Recorder
 except ModuleNotFoundError as error:
@@ -27,4 +27,5 @@ __all__ = [
     "read_log",
     "repair",
     "replay",
+    "replayed",
 ]

@@ -118,6 +118,16 @@ def replay(flight: RecordedFlight, controller: Any = None) -> Replay:
     return result
 
 
+def replayed(flight: RecordedFlight, controller: Any) -> Iterator[tuple[RecordedTick, Command | None]]:
+    """Run a controller, as before its first tick, on the recorded inputs up to the first gap.
+
+    Yields:
+        Each tick with the controller's command, None for a reset; the controller is then as after that tick.
+    """
+    for tick in _unbroken(flight, Replay()):
+        yield tick, _step(controller, tick)
+
+
 def compare_preset(flight: RecordedFlight, preset: PilotConfig) -> PresetComparison:
     """Run the recorded controller and that of a preset on the recorded inputs.
 

@@ -49,6 +49,7 @@ class RecordedFlight:
     facts: Mapping[str, str]  # version, kind, law, config and so on (`ibvs_qp.interfaces.log.header`)
     complete: bool = False  # the last pass of `ticks` came to the end that `Recorder.close` writes
     count: int | None = None  # ticks of the flight, stated there; some may be missing in the log
+    phase: str = ""  # of a pilot's strategy at the last tick that `ticks` gave
 
     def ticks(self) -> Iterator[RecordedTick]:
         """The ticks in their order, up to the end, or to the first damage."""
@@ -70,6 +71,7 @@ class RecordedFlight:
                 _check_plain(row)
                 _check_plain(row.command)
                 if row.tick == given.tick:
+                    self.phase = str(row.phase)
                     yield RecordedTick(given, decode(row.command, Command))
             elif isinstance(record, Channel):
                 names[record.id] = record.topic

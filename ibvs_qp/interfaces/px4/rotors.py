@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 import re
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,8 +37,13 @@ DEFAULTS = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "
 MOST_PX4_ROTORS = 12
 #: Types of parameters in a file of QGroundControl.
 _INT32, _REAL32 = 6, 9
-#: "CA_ROTOR0_PX 0.48" in a file of QGroundControl (with ids before and a type behind), of `param save`, or a script.
-_LINE = re.compile(r"\bCA_(?:ROTOR(\d{1,2})_(PX|PY|PZ|AX|AY|AZ|CT|KM)|(ROTOR_COUNT))[\s,:=]+(\S+)")
+_NAME = r"CA_(?:ROTOR(\d{1,2})_(PX|PY|PZ|AX|AY|AZ|CT|KM)|(ROTOR_COUNT))"
+#: A line that sets a parameter: of a script, of QGroundControl (with ids before and a type behind), of ``param show``,
+#: or a plain pair as other ground stations write it. Comments, and tests as ``param compare``, set nothing.
+_SET = re.compile(
+    rf"(?:param\s+set(?:-default)?\s+(?:-\w+\s+)*|\d+\s+\d+\s+|[x*+\s]*){_NAME}"
+    rf"(?:\s*\[\d+,\d+\]\s*:\s*|\s*[,:=]\s*|\s+)(\S+)(?:\s+\S+)?"
+)
 #: Entries of the mixer that PX4 counts for a torque, and for a thrust [-].
 _LEAST_TORQUE, _LEAST_THRUST = 1e-3, float(np.finfo(np.float32).eps)
 
@@ -63,7 +69,8 @@ def read_px4(file: str | Path) -> Px4Rotors:
         ConfigError: When the file cannot be read, or as `from_px4`.
     """
     try:
-        return from_px4(read_bytes(file, LARGEST_FILE).decode(errors="replace"))
+        content = read_bytes(file, LARGEST_FILE)
+        return from_px4(_from_bson(content) if _is_bson(content) else content.decode(errors="replace"))
     except ConfigError as error:
         raise ConfigError(f"{file}: {error}") from None
 
@@ -72,13 +79,16 @@ def from_px4(text: str) -> Px4Rotors:
     """Rotors of a text with CA_ROTOR_COUNT and CA_ROTORn_*; missing values have PX4's defaults.
 
     Args:
-        text: Parameters as QGroundControl or ``param save`` write them, or the ``param set`` of a script.
+        text: Parameters as QGroundControl writes them, the output of ``param show``, pairs of name and value, or a
+            script with ``param set`` and ``param set-default``. Of several values of a name the last counts.
 
     Raises:
         ConfigError: When a value is not a number, or the rotors are no geometry.
     """
     count, values = 0, dict[int, dict[str, float]]()
-    for rotor, name, total, number in _LINE.findall(text):
+    lines = (line.split("#")[0] for line in text.splitlines())
+    found_lines = (_SET.fullmatch(statement.strip()) for line in lines for statement in line.split(";"))
+    for rotor, name, total, number in (match.groups() for match in found_lines if match):
         value = _number(total or f"ROTOR{rotor}_{name}", number)
         if total:
             count = int(value)
@@ -140,6 +150,30 @@ def setpoint_scale(geometry: RotorGeometry, thrust_max_n: float) -> np.ndarray:
     level = np.sqrt((torque[:, :2] ** 2).sum(axis=0) / (np.maximum(rotors, 1) / 2.0))
     level = np.where(rotors > 0, level, 1.0).max()
     return np.array((*scale, level, level, torque[:, 2].max()))
+
+
+def _is_bson(content: bytes) -> bool:
+    """Whether a file is one of ``param save``: it begins with its length, and ends with zero."""
+    return len(content) > 4 and content[-1] == 0 and int.from_bytes(content[:4], "little") == len(content)
+
+
+def _from_bson(content: bytes) -> str:
+    """Parameters of a BSON document as pairs of name and value.
+
+    Raises:
+        ConfigError: When it has an element that PX4 does not write, or is cut.
+    """
+    kinds = {0x01: "<d", 0x10: "<i", 0x12: "<q"}  # double, int32, int64
+    lines, place = list[str](), 4
+    try:
+        while content[place]:
+            kind, end = kinds[content[place]], content.index(0, place + 1)
+            (value,) = struct.unpack_from(kind, content, end + 1)
+            lines.append(f"{content[place + 1 : end].decode()} {value!r}")
+            place = end + 1 + struct.calcsize(kind)
+    except (KeyError, IndexError, ValueError, struct.error):
+        raise ConfigError(f"its parameters of 'param save' are damaged at byte {place}") from None
+    return "\n".join(lines)
 
 
 def _number(name: str, text: str) -> float:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.interfaces.ros.latest_samples import LatestSamples
-from ibvs_qp.interfaces.ros.open_bag import OpenBag
+from ibvs_qp.interfaces.ros.recording import Recording
 from ibvs_qp.interfaces.ros.topics import ACCEPTED, CAMERA, SAMPLES, Topics
 from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
-
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
 
 #: A message of the IMU makes no frame if the last frame is younger than this ratio of a tick: faster IMUs are thinned.
 LEAST_RATIO = 0.75
@@ -29,17 +26,22 @@ class Bag:
     and holds the last samples of the others that were recorded before it; a picture goes with the first frame after
     both of its parts (`ibvs_qp.interfaces.ros.latest_samples.LatestSamples`).
 
+    A message of the IMU that is not newer than the last frame makes none. Messages left out are counted in
+    ``held.ignored``. Differences of the bag from its own statements are in ``differences``, and warnings at the end of
+    a pass.
+
     Attributes:
         held: Samples of the last pass, with the messages that were left out.
+        differences: Of the last whole pass, in words: counts that differ from those stated, missing or cut files.
 
     Args:
-        path: Folder with metadata.yaml, or a single file .mcap or .db3.
+        path: Folder of the bag, or a single file in MCAP or SQLite.
         topics: Names and axes of the topics; None for the defaults.
     """
 
     def __init__(self, path: str | Path, topics: Topics | None = None) -> None:
         self.path, self.topics = Path(path), topics or Topics()
-        self.held = LatestSamples(self.topics)
+        self.held, self.differences = LatestSamples(self.topics), list[str]()
 
     def sensor_frames(self, period_s: float = 0.004, distortion: tuple[float, ...] = ()) -> Iterator[SensorFrame]:
         """Frames for `ibvs_qp.Pilot.step`; without pictures where the bag has no topic of colour.
@@ -57,13 +59,14 @@ class Bag:
             if role == "camera_info" and camera is not None and not camera.has_lens(distortion):
                 raise ConfigError(
                     f"{self.path}: the lens of camera_info has distortion {camera.distortion}, not {distortion}: set "
-                    "the pilot's camera.distortion, and the argument distortion of sensor_frames"
+                    "the pilot's camera.distortion, and the argument distortion of sensor_frames, or 'rectified' of "
+                    "Topics if the pictures have no lens any more"
                 )
             if role != "imu":
                 continue
             stamp = self.held.last["imu"].stamp_ns
             if last is not None and 0 <= stamp - last < least_ns:
-                continue
+                continue  # faster than the tick
             if (frame := self.held.frame(stamp)) is not None:
                 last = stamp
                 yield frame
@@ -85,32 +88,40 @@ class Bag:
             roles: Roles to read.
             camera: Further ones, where the bag has the topic of the colour pictures.
         """
-        self.held = LatestSamples(self.topics)
-        with contextlib.closing(OpenBag(self.path)) as reader:
-            if any(each.topic == self.topics.color for each in reader.connections):
+        self.held, self.differences = LatestSamples(self.topics), []
+        with contextlib.closing(Recording(self.path)) as recording:
+            if any(each.topic == self.topics.color for each in recording.channels):
                 roles = (*roles, *camera)
-            chosen = {role: self._connection(reader, role, name) for role, name in self.topics.names(roles).items()}
-            for connection, data in reader.messages(list(chosen.values())):
-                for role in (role for role, each in chosen.items() if each.topic == connection.topic):
+            names = self.topics.names(roles)
+            for role, name in names.items():
+                self._check(recording, role, name)
+            for message in recording.messages(set(names.values())):
+                for role in (role for role, name in names.items() if name == message.channel.topic):
+                    if message.channel.type_name not in ACCEPTED[role]:
+                        self.held.ignore(role, "type is another one")
+                        continue
                     try:
-                        value = reader.deserialize(data, connection.msgtype)
+                        value = recording.decode(message)
                     except Exception:
                         self.held.ignore(role, "undecodable")
                         continue
                     if self.held.add(role, value):
                         yield role
+            self.held.finish()
+            self.differences = recording.differences
+        for each in self.differences:
+            warnings.warn(f"{self.path}: {each}", stacklevel=3)
 
-    def _connection(self, reader: OpenBag, role: str, name: str) -> Connection:
-        """Connection of a topic; ConfigError where the bag has none, or one of another type."""
+    def _check(self, recording: Recording, role: str, name: str) -> None:
+        """ConfigError where the bag has no such topic, or only of another type."""
         types = " or ".join(kind.replace("/msg/", "/") for kind in ACCEPTED[role])
-        found = next((each for each in reader.connections if each.topic == name), None)
-        if found is None:
-            near = sorted({each.topic for each in reader.connections if each.msgtype in ACCEPTED[role]})
+        found = [each.type_name for each in recording.channels if each.topic == name]
+        if not found:
+            near = sorted({each.topic for each in recording.channels if each.type_name in ACCEPTED[role]})
             hint = f"of such a type are {', '.join(near)}" if near else "no topic has such a type"
             raise ConfigError(f"{self.path}: no topic {name} for {role} ({types}); {hint}")
-        if found.msgtype not in ACCEPTED[role]:
-            raise ConfigError(f"{self.path}: topic {name} for {role} has type {shown(found.msgtype)}, not {types}")
-        return found
+        if not set(found) & set(ACCEPTED[role]):
+            raise ConfigError(f"{self.path}: topic {name} for {role} has type {shown(found[0])}, not {types}")
 
 
 def sensor_frames(path: str | Path, topics: Topics | None = None) -> Iterator[SensorFrame]:

@@ -14,8 +14,10 @@ from ibvs_qp.interfaces.ros.topics import MOTION, Topics
 from ibvs_qp.measurement import RgbdFrame, SensorFrame, channels
 from ibvs_qp.validation.clock import LEAD_NS
 
-#: Colour and depth pictures that wait for their partner; they arrive within a frame of each other.
-WAITING = 4
+#: Longest time by their stamps that colour and depth wait for their partner [ns]: aligned depth comes 30 to 70 ms late.
+WAITING_NS = 250_000_000
+#: A stamp that goes back by more is of a clock that was set, and not of a late sample [ns].
+CLOCK_SET_NS = 1_000_000_000
 #: A stamp of the system's clock lies at most this far behind it [ns].
 LATEST_NS = 1_000_000_000
 
@@ -23,9 +25,9 @@ LATEST_NS = 1_000_000_000
 class LatestSamples:
     """Collects messages in the order of their arrival.
 
-    A frame has the last received sample of every sensor with its own stamp, for any order of the stamps: the
-    pilot checks their age. Colour and depth are paired by the nearest stamps within ``pair_s``. A message that cannot
-    be used is left out and counted.
+    A frame has the last sample of every sensor with its own stamp; the pilot checks their age. Colour and depth are
+    paired by the nearest stamps within ``pair_s``, however late one of them comes. A message that cannot be used, and a
+    sample that is late or repeated, is left out and counted.
 
     Attributes:
         last: Last sample of each role.
@@ -44,8 +46,9 @@ class LatestSamples:
         self.ignored = Counter[str]()
         self.camera: pictures.Camera | None = None
         self.pairs = 0
-        self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque(maxlen=WAITING) for name in ("color", "depth")}
+        self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque() for name in ("color", "depth")}
         self._picture: RgbdFrame | None = None
+        self._paired_ns = -1
 
     @np.errstate(all="ignore")  # a host may have numpy raise for the NaN of a message
     def add(self, role: str, value: Any) -> bool:
@@ -54,7 +57,7 @@ class LatestSamples:
             if role in self._waiting:
                 self._add_picture(role, value)
             elif role == "camera_info":
-                self.camera = pictures.to_camera(value)
+                self.camera = pictures.to_camera(value, self._topics.rectified)
             else:
                 self._add_sample(role, value)
         except BadMessage as error:
@@ -78,6 +81,11 @@ class LatestSamples:
             values |= sample.values | {channels(SensorFrame)[name].stamp: sample.stamp_ns for name in sample.values}
         return SensorFrame(stamp_ns=stamp_ns, image=self.take_picture(), **values)
 
+    def finish(self) -> None:
+        """Count the pictures that still wait, at the end of a recording."""
+        for role, waiting in self._waiting.items():
+            self._forget(role, len(waiting))
+
     def take_picture(self) -> RgbdFrame | None:
         """The last complete picture, once."""
         picture, self._picture = self._picture, None
@@ -90,10 +98,11 @@ class LatestSamples:
 
     def _add_sample(self, role: str, value: Any) -> None:
         sample = samples.READERS[role](value, self._topics)
-        if role == "imu" and not self._topics.attitude:
-            self.check_clock(sample.stamp_ns)
-            self.last["attitude"] = samples.attitude(value)
         self.check_clock(sample.stamp_ns)
+        if (before := self.last.get(role)) is not None and 0 <= before.stamp_ns - sample.stamp_ns < CLOCK_SET_NS:
+            raise BadMessage("not newer than the one before")
+        if role == "imu" and not self._topics.attitude:
+            self.last["attitude"] = samples.attitude(value)
         self.last[role] = sample
 
     def _add_picture(self, role: str, value: Any) -> None:
@@ -101,19 +110,43 @@ class LatestSamples:
         pixels = pictures.to_rgb(value) if role == "color" else pictures.to_depth(value)
         stamp = from_ros(value.header.stamp)
         self.check_clock(stamp)
-        own, other = self._waiting[role], self._waiting["depth" if role == "color" else "color"]
+        if 0 <= self._paired_ns - stamp < CLOCK_SET_NS:
+            raise BadMessage("not newer than the last pair")
+        own, other = self._waiting[role], self._waiting[partner := "depth" if role == "color" else "color"]
         nearest = min(other, key=lambda each: abs(each[0] - stamp), default=None)
         if nearest is None or abs(nearest[0] - stamp) > round(self._topics.pair_s * 1e9):
             own.append((stamp, pixels))
+            self._drop(role, lambda waiting: stamp - waiting > WAITING_NS or waiting - stamp >= CLOCK_SET_NS)
             return
-        own.clear()
-        other.clear()
+        self._drop(role, lambda waiting: waiting <= stamp)
+        self._drop(partner, lambda waiting: waiting < nearest[0])
+        other.remove(nearest)
         (color_ns, rgb), (_, depth) = ((stamp, pixels), nearest) if role == "color" else (nearest, (stamp, pixels))
+        self._paired_ns = min(stamp, nearest[0])
         if (camera := self.camera) is None:
             raise BadMessage("no camera info yet")
         if self._topics.depth_registered and rgb.shape[:2] != depth.shape:
             raise BadMessage("colour and depth differ in size")
         if rgb.shape[:2] != camera.shape:  # binning and a region of interest change it as well, and with it the pixels
             raise BadMessage("size is not that of camera_info")
+        if self._picture is not None:
+            self.ignore("color", "a newer picture came before a frame")
         self._picture = RgbdFrame(rgb=rgb, depth=depth, intrinsics=camera.intrinsics, stamp_ns=color_ns)
         self.pairs += 1
+
+    def _drop(self, role: str, old: Callable[[int], bool]) -> None:
+        """Leave out waiting pictures by their stamps, and count them."""
+        waiting = self._waiting[role]
+        kept = [each for each in waiting if not old(each[0])]
+        self._forget(role, len(waiting) - len(kept))
+        waiting.clear()
+        waiting.extend(kept)
+
+    def _forget(self, role: str, count: int) -> None:
+        if count:
+            partner = "depth" if role == "color" else "colour"
+            self.ignored[f"{role}: no {partner} within pair_s"] += count
+
+
+#: Former name.
+HeldSamples = LatestSamples

@@ -21,6 +21,7 @@ MOST_ENTRIES = 4 * 4096 * 4096
 _SECOND, _MICROSECOND, _LARGEST_US = 1_000_000_000, 1_000, 2**31 * 1_000_000
 
 IMAGE, CAMERA_INFO, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo", "sensor_msgs/msg/Imu"
+COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 SENSOR_COMBINED, VEHICLE_ATTITUDE = "px4_msgs/msg/SensorCombined", "px4_msgs/msg/VehicleAttitude"
 

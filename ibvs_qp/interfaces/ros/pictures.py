@@ -6,14 +6,19 @@ import itertools
 import sys
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 
-from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, IMAGE, BadMessage, header, message
+from ibvs_qp.interfaces.ros import compressed
+from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BadMessage, header, message
 from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
 
 #: Channels of the colour encodings, in the order red, green, blue.
 _RGB, _BGR = (0, 1, 2), (2, 1, 0)
 _COLOURS = {"rgb8": (3, _RGB), "bgr8": (3, _BGR), "rgba8": (4, _RGB), "bgra8": (4, _BGR), "mono8": (1, (0, 0, 0))}
+#: Encodings of two bytes per pixel with half the colour, and OpenCV's conversions: luma second, and luma first.
+_HALF_COLOURS = {"yuv422": cv2.COLOR_YUV2RGB_UYVY, "uyvy": cv2.COLOR_YUV2RGB_UYVY,
+                 "yuv422_yuy2": cv2.COLOR_YUV2RGB_YUY2, "yuyv": cv2.COLOR_YUV2RGB_YUY2}  # fmt: skip
 #: Numbers of the depth encodings, and their unit [m] (REP 118).
 _DEPTHS = {"16UC1": ("u2", 1e-3), "32FC1": ("f4", 1.0)}
 #: Longest side of a picture [px].
@@ -39,7 +44,14 @@ class Camera(NamedTuple):
 
 
 def to_rgb(image: Any) -> np.ndarray:
-    """Colour, uint8 (H, W, 3)."""
+    """Colour of an ``Image`` or ``CompressedImage``, uint8 (H, W, 3)."""
+    if image.__msgtype__ == COMPRESSED_IMAGE:
+        return compressed.colour(image, LONGEST_SIDE)
+    if image.encoding in _HALF_COLOURS:
+        pairs = _rows(image, 2).reshape(image.height, image.width, 2)
+        if image.width % 2:
+            raise BadMessage("encoding needs an even width")
+        return cv2.cvtColor(pairs, _HALF_COLOURS[image.encoding])
     if image.encoding not in _COLOURS:
         raise BadMessage("encoding is no colour of 8 bits")
     channels, order = _COLOURS[image.encoding]
@@ -48,7 +60,9 @@ def to_rgb(image: Any) -> np.ndarray:
 
 
 def to_depth(image: Any) -> np.ndarray:
-    """Depth [m], float32 (H, W), 0 where invalid."""
+    """Depth of an ``Image`` or ``CompressedImage`` [m], float32 (H, W), 0 where invalid."""
+    if image.__msgtype__ == COMPRESSED_IMAGE:
+        return compressed.depth(image, LONGEST_SIDE)
     if image.encoding not in _DEPTHS:
         raise BadMessage("encoding is not 16UC1 or 32FC1")
     kind, unit = _DEPTHS[image.encoding]
@@ -59,8 +73,19 @@ def to_depth(image: Any) -> np.ndarray:
     return np.where(np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
 
 
-def to_camera(info: Any) -> Camera:
-    """Camera of a ``sensor_msgs/CameraInfo`` with a camera matrix and a lens model of OpenCV."""
+def to_camera(info: Any, rectified: bool = False) -> Camera:
+    """Camera of a ``sensor_msgs/CameraInfo`` with a camera matrix and a lens model of OpenCV.
+
+    Args:
+        info: The message.
+        rectified: Whether its pictures are rectified: their camera is P, without a lens.
+    """
+    shape = int(info.height), int(info.width)
+    if rectified:
+        p = np.asarray(info.p, float)
+        if not (np.isfinite(p).all() and min(p[0], p[5]) > 1.0):
+            raise BadMessage("no projection matrix P")
+        return Camera((float(p[0]), float(p[5]), float(p[2]), float(p[6])), shape, ())
     k = np.asarray(info.k, float)
     if not (np.isfinite(k).all() and min(k[0], k[4]) > 1.0):
         raise BadMessage("no camera matrix")
@@ -68,8 +93,7 @@ def to_camera(info: Any) -> Camera:
         raise BadMessage("distortion_model is not plumb_bob or rational_polynomial")
     if len(info.d) not in DISTORTION_SIZES or not np.isfinite(info.d).all():
         raise BadMessage(f"d has not {', '.join(map(str, DISTORTION_SIZES))} finite coefficients")
-    intrinsics = float(k[0]), float(k[4]), float(k[2]), float(k[5])
-    return Camera(intrinsics, (int(info.height), int(info.width)), tuple(map(float, info.d)))
+    return Camera((float(k[0]), float(k[4]), float(k[2]), float(k[5])), shape, tuple(map(float, info.d)))
 
 
 def from_rgb(rgb: np.ndarray, stamp_ns: int) -> Any:

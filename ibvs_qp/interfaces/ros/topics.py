@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import choice, setting, validate
-from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, IMAGE, IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH
+from ibvs_qp.interfaces.ros.messages import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    IMU,
+    SENSOR_COMBINED,
+    VEHICLE_ATTITUDE,
+    WRENCH,
+)
 
 TWIST = "geometry_msgs/msg/TwistStamped"
 #: Types that every topic may have, the usual one first.
@@ -16,8 +24,8 @@ ACCEPTED = {
     "attitude": (VEHICLE_ATTITUDE, IMU),
     "wrench": (WRENCH,),
     "height_rate": (TWIST,),
-    "color": (IMAGE,),
-    "depth": (IMAGE,),
+    "color": (IMAGE, COMPRESSED_IMAGE),
+    "depth": (IMAGE, COMPRESSED_IMAGE),
     "camera_info": (CAMERA_INFO,),
 }
 #: Topics of pictures; of everything else that a frame needs, and that it may have.
@@ -42,14 +50,18 @@ class Topics:
     attitude: str = setting("", "px4_msgs/VehicleAttitude or sensor_msgs/Imu; empty for the orientation in imu")
     wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
     height_rate: str = setting("", "rate of climb: geometry_msgs/TwistStamped, linear.z upwards; empty for none")
-    color: str = setting("/camera/camera/color/image_raw", "colour: sensor_msgs/Image, 8 bits per channel")
+    color: str = setting("/camera/camera/color/image_raw", "colour: Image of 8 bits per channel, or CompressedImage")
     depth: str = setting(
-        "/camera/camera/aligned_depth_to_color/image_raw", "depth, registered or not: 16UC1 (mm) or 32FC1 (m)"
+        "/camera/camera/aligned_depth_to_color/image_raw",
+        "depth, registered or not: Image in 16UC1 (mm) or 32FC1 (m), or compressedDepth",
     )
     depth_registered: bool = setting(
         True, "depth has colour's pixels (False: its own; depth_intrinsics and the like in [camera] place them)"
     )
     camera_info: str = setting("/camera/camera/color/camera_info", "sensor_msgs/CameraInfo of the colour pictures")
+    rectified: bool = setting(
+        False, "pictures are rectified (image_rect): their camera is P of camera_info, and they have no lens"
+    )
     wrench_axes: str = choice("flu", "axes of the force sensor: front-left-up or front-right-down", ("flu", "frd"))
     wrench_on: str = choice(
         "tool", "whom the reported wrench acts on; a push reads +x on the tool", ("tool", "vehicle")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import threading
 from typing import Any
 
 import numpy as np
@@ -65,10 +67,12 @@ class OsqpSolver(Solver):
         if initial is not None:
             self.warm_start(initial, self._no_multipliers)  # after the update: OSQP computes A x here
         if self._inner is None:
-            result = self.workspace.solve(raise_error=False)
+            with _one_at_a_time.lock:
+                result = self.workspace.solve(raise_error=False)
             x, y, info = result.x, result.y, result.info
         else:
-            self._inner.solve()
+            with _one_at_a_time.lock:
+                self._inner.solve()
             solution, info = self._inner.solution, self._inner.info
             x, y = np.array(solution.x), np.array(solution.y)
         if info.status_val == INTERRUPTED:
@@ -91,6 +95,25 @@ class OsqpSolver(Solver):
         if self.workspace is not None:
             self.start = *self._iterate, self.workspace.settings.rho
         return super().save_memory()
+
+
+class _OneAtATime:
+    """Lock of every solve in the process.
+
+    OSQP puts its own handler of SIGINT in place meanwhile and restores the one before. After two overlapping solves
+    that is its own, and Ctrl-C is dead.
+    """
+
+    def __init__(self) -> None:
+        self.renew()
+        if hasattr(os, "register_at_fork"):  # another thread may hold it while the process forks
+            os.register_at_fork(after_in_child=self.renew)
+
+    def renew(self) -> None:
+        self.lock = threading.Lock()
+
+
+_one_at_a_time = _OneAtATime()
 
 
 def osqp_settings(settings: SolverSettings) -> dict[str, float]:

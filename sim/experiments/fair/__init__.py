@@ -1,1 +1,1 @@
-"""The record that separates laws from gains: comparisons of the experiment ``fair``, and its page."""
+"""The record that separates laws from gains: the page of the experiment ``fair``."""

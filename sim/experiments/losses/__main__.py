@@ -19,9 +19,9 @@ import polars as pl
 from rich.console import Console
 
 from sim.evaluate.table import terminal_table
+from sim.experiments.comparison import Outcome
 from sim.experiments.losses.comparison import comparisons
 from sim.experiments.losses.flights import COMPARED, runs_of
-from sim.experiments.opponent import Outcome
 from sim.experiments.part_of_flights import add_part_options, fly_part, parse_part
 from sim.flight.closed_loop import fly
 from sim.sweep.tables import read_tables

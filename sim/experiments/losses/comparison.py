@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import polars as pl
 
+from sim.experiments.comparison import Comparison, against
 from sim.experiments.losses.flights import base_of
-from sim.experiments.opponent import Comparison, against
 from sim.experiments.spec import experiment
 from sim.sweep.statistics import parameters, split
 

@@ -128,3 +128,8 @@ def test_any_bytes_are_toml_or_one_line(content: bytes) -> None:
         assert isinstance(parse_toml(content, "x"), dict)
     except ConfigError as error:
         assert str(error).startswith("x is ")
+
+
+def test_a_mark_of_a_windows_editor_is_no_part_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_bytes(b"\xef\xbb\xbf[controller]\r\ntick_s = 0.002\r\n")
+    assert PilotConfig.from_toml(tmp_path / "mine.toml").controller.tick_s == 0.002

@@ -1,4 +1,4 @@
-"""Ctrl-C while OSQP solves."""
+"""Ctrl-C while OSQP solves, and after two solves that overlapped."""
 
 from __future__ import annotations
 
@@ -55,3 +55,35 @@ def test_ctrl_c_during_a_solve_arrives() -> None:
         assert process.wait(timeout=10) == 0
     finally:
         process.kill()
+
+
+_OVERLAPPING = """
+import os, signal, threading, time, numpy as np
+from controller_scenes import pack, random_tick
+from ibvs_qp.controller import HybridController
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def solve(controller):
+    data, solver = controller.engine.data, controller.engine.solver
+    for _ in range(300):
+        data.q[:] = -data.q
+        solver.solve(data.p, data.q, data.a, data.lower, data.upper)
+controllers = [HybridController() for _ in range(2)]
+for controller in controllers:
+    pack(controller, *random_tick(np.random.default_rng(0), 2))
+threads = [threading.Thread(target=solve, args=(each,)) for each in controllers]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(30.0)
+except KeyboardInterrupt:
+    os._exit(7)
+"""
+
+
+def test_ctrl_c_arrives_after_controllers_were_stepped_in_two_threads() -> None:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run([sys.executable, "-c", _OVERLAPPING], env=environment, timeout=120, capture_output=True)
+    assert done.returncode == 7, done.stderr.decode()

@@ -56,9 +56,9 @@ def test_json_follows_the_contract(flown, tmp_path, capsys):
         assert {"median", "low", "high"} == set(cell["metrics"]["settle_s"])
     assert json.loads((tmp_path / "run" / "force-hold.json").read_text()) == content
     assert (tmp_path / "run" / "figures" / "force-hold-1.5kNm.png").stat().st_size > 10_000
-    page = (tmp_path / "run" / "tables.md").read_text()
+    page = (tmp_path / "run" / "results.md").read_text()
     assert "0.050" in page and "figures/force-hold-map.png" in page
-    assert "is steadier" not in (tmp_path / "run" / "results.md").read_text()  # one pair decides nothing
+    assert "| better |" not in page and "| worse |" not in page  # one pair decides nothing
 
 
 def test_the_same_folder_flies_nothing_twice(flown, capsys):
@@ -171,7 +171,7 @@ def test_the_page_says_how_to_redo_it_with_the_same_choices(flown, tmp_path):
     (tmp_path / "run" / "figures" / "of-an-earlier-page.png").touch()
     assert main([*words, "--jobs", "1", "--json", "--out", "run"]) == 0
     assert {file.name for file in (tmp_path / "run" / "figures").iterdir()} == {"approach.png"}
-    page = (tmp_path / "run" / "tables.md").read_text()
+    page = (tmp_path / "run" / "results.md").read_text()
     assert "Command: `ibvs-qp experiment approach --quick --features geometric --seed 3`" in page
     assert "too few for such an interval" in page and "-0.00" not in page and "_n_m" not in page
 

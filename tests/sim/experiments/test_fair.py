@@ -7,16 +7,21 @@ import polars as pl
 import pytest
 
 from sim.experiments import FAIR
+from sim.experiments.comparison import Comparison, Outcome, grouped, opponent_name
+from sim.experiments.comparison import comparisons as of_experiment
 from sim.experiments.design import Choice, design
-from sim.experiments.fair.__main__ import Fields, page
-from sim.experiments.fair.comparison import OWN, comparisons, grouped, opponent_name
-from sim.experiments.opponent import Outcome
+from sim.experiments.fair.__main__ import page
+from sim.experiments.page import QP, Fields
 from sim.experiments.spec import experiment
 from sim.rivals import MPC
 from sim.sweep.mixed import CROSSED, law_and_gains
 
 CELLS = (("paint", "datasheet", 0.1), ("slide at the reach", "ideal", 12.6))
 LAWS = (*CROSSED, ("paper", "box"), ("qp", "mpc"))
+
+
+def comparisons(table: pl.DataFrame) -> list[Comparison]:
+    return of_experiment(experiment(FAIR), table)
 
 
 def flights(law_effect: float, gain_effect: float) -> pl.DataFrame:
@@ -52,14 +57,14 @@ def test_the_mixed_model_separates_law_and_gains():
 
 def test_a_larger_error_of_the_opponent_is_a_win_and_the_group_counts_once():
     found, analytic = comparisons(flights(0.8, 0.0)), opponent_name("paper", "standard")
-    opponents = {opponent_name(*law) for law in LAWS if law not in OWN}
+    opponents = {opponent_name(*law) for law in LAWS if law != QP}
     assert {each.opponent for each in found} == opponents
     path = [each for each in found if each.metric.startswith("path") and each.opponent == analytic]
     assert len(path) == 4 and {each.outcome for each in path} == {Outcome.WON}
     groups = {key: value for key, value in grouped(found).items() if key[0] == analytic and key[2] == "path"}
     assert list(groups.values()) == [{Outcome.WON}, {Outcome.WON}]
-    lost = grouped(comparisons(flights(-0.8, 0.0)))
-    assert {value for key, value in lost.items() if key[2] == "path"} == {frozenset({Outcome.LOST})}
+    lost, gains = grouped(comparisons(flights(-0.8, 0.0))), opponent_name("qp", "exchanged-gains")
+    assert {value for key, value in lost.items() if key[2] == "path" and key[0] != gains} == {frozenset({Outcome.LOST})}
 
 
 def test_a_group_that_is_better_and_worse_counts_as_both():
@@ -76,10 +81,15 @@ def test_flights_that_both_laws_complete_are_no_difference():
 
 def test_the_page_has_every_number_from_the_table():
     table = flights(0.8, 0.0)
-    text, fields = page(table), Fields(table)
+    text, fields = page(table), Fields(experiment(FAIR), table)
     assert f"{table.height} flights" in text and "{{" not in text
     assert "| analytic law, box | 3 |" in text  # the paths of both cells, and the slide
-    assert "| paint 0.1, datasheet | 10 of 10 |" in text and "held 10 of 10" in text and "held 0 of 10" in text
+    assert (
+        "| paint, world datasheet" in text
+        and "| 10 of 10 |" in text
+        and "held 10 of 10" in text
+        and "held 0 of 10" in text
+    )
     cell = {"kind": "paint", "world": "datasheet", "level": 0.1}
     assert fields.median("path_rms_m", "qp", **cell).endswith(" mm")
     assert fields.gap("path_rms_m", "paper", **cell).startswith("+")

@@ -11,10 +11,10 @@ from typing import Any
 import polars as pl
 import pytest
 
+from sim.experiments.comparison import Comparison, Outcome
 from sim.experiments.losses.__main__ import main, step_times
 from sim.experiments.losses.comparison import comparisons
 from sim.experiments.losses.flights import COMPARED, LIMITED, base_of, runs_of
-from sim.experiments.opponent import Comparison, Outcome
 from sim.rivals import MPC
 
 #: A row of the page: an opponent and four counts.

@@ -16,7 +16,7 @@ from sim.experiments.design import Choice, designs
 from sim.experiments.spec import experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
-from sim.sweep.paired import exact_interval, paired_differences, sign, variant_differences
+from sim.sweep.paired import exact_interval, paired_differences, sign
 from sim.sweep.parts import frame, write_table
 from sim.sweep.statistics import cells, median_interval, needed, spread
 
@@ -99,17 +99,6 @@ def test_flights_that_a_law_did_not_end_are_failures_and_no_differences():
     assert by_law == {"qp": 1.0, "paper": 2.0}
     lived = {cell["law"]: cell["metrics"]["error"]["median"] for cell in cells(data, of_all=("error",))}
     assert lived["paper"] == 2.0 and len(lived) == 2
-
-
-def test_a_variant_is_compared_with_what_it_is_judged_against():
-    parts = [table({"qp": [1.0, 2.0]}), table({"qp": [4.0, 4.0]}), table({"qp": [9.0, 9.0]})]
-    names = ("standard", "unchecked", "clipped")
-    data = pl.concat([part.with_columns(variant=pl.lit(name)) for part, name in zip(parts, names, strict=True)])
-    found = variant_differences(data, {"clipped": ("unchecked", "standard"), "unchecked": ("standard",)})
-    assert [(each["variant"], each["against"]) for each in found] == [
-        ("unchecked", "standard"), ("clipped", "unchecked"),
-    ]  # fmt: skip
-    assert found[0]["differences"]["error"]["median"] == 2.5 and found[1]["differences"]["error"]["median"] == 5.0
 
 
 def test_cells_keep_the_order_and_count_failures():

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import itertools
 import multiprocessing
+import os
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -51,3 +54,14 @@ def test_no_picture_waits_for_a_compiler() -> None:
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as process:
         before, after = process.submit(_signatures_around_pictures).result()
     assert set(before.values()) == set(after.values()) == {1}, (before, after)
+
+
+def test_vision_loads_where_nothing_is_compiled() -> None:
+    """NUMBA_DISABLE_JIT=1, to debug, to measure coverage, or on a platform without LLVM."""
+    code = (
+        "from ibvs_qp.vision.compilation import prepare; import ibvs_qp.vision.perception; prepare(); print('loaded')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True
+    )
+    assert done.stdout == "loaded\n", done.stderr

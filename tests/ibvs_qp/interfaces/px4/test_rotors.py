@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from allocation import TAROT_T960, RotorGeometry, control_effectiveness
 from ibvs_qp import preset
 from ibvs_qp.config.errors import ConfigError
-from ibvs_qp.interfaces.px4.rotors import from_px4, setpoint_scale, to_px4
+from ibvs_qp.interfaces.px4.rotors import from_px4, read_px4, setpoint_scale, to_px4
 
 OCTOROTOR = preset("octorotor_qp").controller.vehicle
 VEHICLES = {"hexarotor": (TAROT_T960, np.full(6, 52.56)), "octorotor": (OCTOROTOR.geometry, OCTOROTOR.thrust_max)}
@@ -56,6 +58,63 @@ def test_a_script_is_read_and_what_it_leaves_out_has_px4s_default() -> None:
     np.testing.assert_allclose(found.geometry.axes, [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8]])
     assert found.geometry.spins.tolist() == [-1.0, 1.0] and found.geometry.torque_ratios.tolist() == [0.05, 0.05]
     assert found.thrust_coefficients == (6.5, 8.5)
+
+
+#: The parameters of `SCRIPT` as other programs write them.
+PAIRS = {name: value for _, _, name, value in (line.split() for line in SCRIPT.split("\n") if line)}
+
+
+def bson(pairs: dict[str, str]) -> bytes:
+    """A file of ``param save``."""
+    items = b"".join(
+        b"\x10" + name.encode() + b"\0" + struct.pack("<i", int(value))
+        if name in ("CA_AIRFRAME", "CA_ROTOR_COUNT")
+        else b"\x01" + name.encode() + b"\0" + struct.pack("<d", float(value))
+        for name, value in pairs.items()
+    )
+    return struct.pack("<i", len(items) + 5) + items + b"\0"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "".join(f"1\t1\t{name}\t{value}\t9\n" for name, value in PAIRS.items()),
+        "".join(f"{name},{value}\n" for name, value in PAIRS.items()),
+        "".join(f"{name} = {value}\r\n" for name, value in PAIRS.items()),
+        "".join(f"x + {name} [12,345] : {value}\n" for name, value in PAIRS.items()),
+        "param set-default -s MC_ROLL_P 7; " + "; ".join(f"param set {each} {value}" for each, value in PAIRS.items()),
+        bson(PAIRS),
+    ],
+    ids=["QGroundControl", "commas", "equals", "param show", "one line", "param save"],
+)
+def test_every_form_of_a_parameter_file_is_told_by_its_content(tmp_path: Path, content: str | bytes) -> None:
+    file = tmp_path / "4050_generic"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert read_px4(file) == from_px4(SCRIPT)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "# param set-default CA_ROTOR1_AX -0.25",
+        "#CA_ROTOR_COUNT 4 (the old quad)",
+        "param set-default MC_YAW_P 2 # CA_ROTOR0_PX 3",
+        "if param compare CA_ROTOR_COUNT 4",
+        "if param greater -s CA_ROTOR0_PX 0.1",
+        "echo CA_ROTOR0_PX 4",
+        "param reset CA_ROTOR0_PX 1",
+    ],
+)
+def test_what_sets_nothing_changes_nothing(line: str) -> None:
+    assert from_px4(f"{line}\n{SCRIPT}{line}\n") == from_px4(SCRIPT)
+
+
+def test_damaged_parameters_of_param_save_are_refused(tmp_path: Path) -> None:
+    content = bson(PAIRS)
+    for spoilt in (content[:4] + b"\x05" + content[5:], content[:4] + b"\x01A\0\0\0" + b"\0"):
+        (tmp_path / "params").write_bytes(struct.pack("<i", len(spoilt)) + spoilt[4:])
+        with pytest.raises(ConfigError, match="parameters of 'param save' are damaged"):
+            read_px4(tmp_path / "params")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,114 @@
+"""A ROS 2 bag through the pilot, open loop: phases, refusals, messages left out, and a log of the flight."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import itertools
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ibvs_qp.interfaces.ros.topics import Topics
+    from ibvs_qp.pilot import PilotConfig
+
+#: Reasons of refused inputs that are printed; the JSON line has all.
+MOST_REASONS = 12
+
+
+@dataclasses.dataclass(kw_only=True)
+class BagFlight:
+    """Flight of a pilot over a bag.
+
+    Attributes:
+        frames, pictures: Given to the pilot.
+        duration_s: From the first to the last frame [s].
+        phases: Beginning [s], name and reason of every phase and other event of the strategy.
+        safety: Frames in every state of the supervisor, and the last reasons of those that are not nominal.
+        outcomes: Commands by outcome.
+        rejected: Inputs that the pilot refused, by reason without its numbers.
+        left_out: Messages of the bag that made no frame, by role and reason.
+        differences: Of the bag from its own statements.
+    """
+
+    frames: int = 0
+    pictures: int = 0
+    duration_s: float = 0.0
+    phases: list[tuple[float, str, str]] = dataclasses.field(default_factory=list)
+    safety: dict[str, int] = dataclasses.field(default_factory=dict)
+    safety_reasons: dict[str, str] = dataclasses.field(default_factory=dict)
+    outcomes: dict[str, int] = dataclasses.field(default_factory=dict)
+    rejected: dict[str, int] = dataclasses.field(default_factory=dict)
+    left_out: dict[str, int] = dataclasses.field(default_factory=dict)
+    differences: list[str] = dataclasses.field(default_factory=list)
+
+
+def read_topics(file: Path | None) -> Topics:
+    """Topics of a TOML file, or of the section ``[topics]`` of a bridge's settings; the defaults for None."""
+    from ibvs_qp.config.errors import ConfigError
+    from ibvs_qp.config.files import read_toml
+    from ibvs_qp.config.settings import from_dict
+    from ibvs_qp.interfaces.ros.topics import Topics
+
+    if file is None:
+        return Topics()
+    table = read_toml(file)
+    try:
+        return from_dict(Topics, table.get("topics", table))
+    except ConfigError as error:
+        raise ConfigError(f"--topics {file}: {error}") from None
+
+
+def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFlight:
+    """Step a pilot with every frame of a bag, and record it."""
+    import warnings
+
+    from ibvs_qp.interfaces.log import Recorder
+    from ibvs_qp.interfaces.ros.bag import Bag
+    from ibvs_qp.pilot import Pilot
+
+    bag, pilot, found = Bag(path, topics), Pilot(config), BagFlight()
+    outcomes, safety, rejected, first_ns = Counter[str](), Counter[str](), Counter[str](), None
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore")  # the differences are printed
+        frames = bag.sensor_frames(config.controller.tick_s, config.camera.distortion)
+        first = next(frames, None)  # a bag that is refused leaves no log
+        recorder = stack.enter_context(Recorder(log, pilot))
+        for frame in itertools.chain(() if first is None else (first,), frames):
+            if frame.image is not None and not found.pictures:
+                pilot.prepare(frame.image)
+            command = recorder.step(frame)
+            first_ns = frame.stamp_ns if first_ns is None else first_ns
+            found.frames, found.pictures = found.frames + 1, found.pictures + (frame.image is not None)
+            found.duration_s = 1e-9 * (frame.stamp_ns - first_ns)
+            outcomes[str(command.outcome)] += 1
+            safety[str(command.safety)] += 1
+            if command.safety_reasons:
+                found.safety_reasons[str(command.safety)] = "; ".join(command.safety_reasons)
+            rejected.update({text.split(":")[0] for text in command.rejected})
+    begin_s = 1e-9 * (first_ns or 0)
+    found.phases = [(event.time_s - begin_s, event.name, event.reason) for event in pilot.status.events]
+    found.outcomes, found.safety, found.rejected = dict(outcomes), dict(safety), dict(rejected)
+    found.left_out, found.differences = dict(bag.held.ignored), bag.differences
+    return found
+
+
+def bag_text(found: BagFlight) -> list[str]:
+    """Lines for the terminal."""
+    lines = [f"{found.frames} frames in {found.duration_s:.2f} s, {found.pictures} with a picture"]
+    lines += [f"  {time_s:8.2f} s  {name}: {reason}" for time_s, name, reason in found.phases]
+    lines.append("supervisor: " + ", ".join(f"{state} {count}" for state, count in found.safety.items()))
+    lines += [f"  {state}: {reason}" for state, reason in found.safety_reasons.items()]
+    lines.append("commands: " + ", ".join(f"{outcome} {count}" for outcome, count in found.outcomes.items()))
+    for title, counts in (("refused by the pilot", found.rejected), ("left out of the bag", found.left_out)):
+        reasons = sorted(counts.items(), key=lambda each: -each[1])
+        lines.append(f"{title}: {'nothing' if not reasons else ''}".rstrip())
+        lines += [f"  {count} times  {reason}" for reason, count in reasons[:MOST_REASONS]]
+    return lines + [f"the bag: {each}" for each in found.differences]
+
+
+def summary(path: Path, log: Path, found: BagFlight) -> dict[str, Any]:
+    """The JSON line."""
+    return {"schema": 1, "bag": str(path), "log": str(log), **dataclasses.asdict(found)}
