@@ -29,7 +29,8 @@ class BagFlight:
         outcomes: Commands by outcome.
         rejected: Inputs that the pilot refused, by reason without its numbers.
         left_out: Messages of the bag that made no frame, by role and reason.
-        differences: Of the bag from its own statements.
+        poses: Of camera and force sensor from the base frame by ``/tf_static``, front-right-down [m].
+        differences: Of the bag from its own statements, and of its poses from the vehicle.
     """
 
     frames: int = 0
@@ -41,6 +42,7 @@ class BagFlight:
     outcomes: dict[str, int] = dataclasses.field(default_factory=dict)
     rejected: dict[str, int] = dataclasses.field(default_factory=dict)
     left_out: dict[str, int] = dataclasses.field(default_factory=dict)
+    poses: dict[str, list[float]] = dataclasses.field(default_factory=dict)
     differences: list[str] = dataclasses.field(default_factory=list)
 
 
@@ -64,8 +66,11 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
     """Step a pilot with every frame of a bag, and record it."""
     import warnings
 
+    import numpy as np
+
     from ibvs_qp.interfaces.log import Recorder
     from ibvs_qp.interfaces.ros.bag import Bag
+    from ibvs_qp.interfaces.ros.static_poses import differences
     from ibvs_qp.pilot import Pilot
 
     bag, pilot, found = Bag(path, topics), Pilot(config), BagFlight()
@@ -91,7 +96,15 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
     begin_s = 1e-9 * (first_ns or 0)
     found.phases = [(event.time_s - begin_s, event.name, event.reason) for event in pilot.status.events]
     found.outcomes, found.safety, found.rejected = dict(outcomes), dict(safety), dict(rejected)
-    found.left_out, found.differences = dict(bag.held.ignored), bag.differences
+    found.left_out, found.differences = dict(bag.held.ignored), list(bag.differences)
+    names = (bag.frame_ids.get(role, "") for role in ("color", "wrench"))
+    camera, force = (bag.poses.pose(name, topics.base_frame) for name in names)
+    found.poses = {
+        f"{name}_position_m": np.round(pose.position_m, 4).tolist()
+        for name, pose in (("camera", camera), ("force_torque", force))
+        if pose is not None
+    }
+    found.differences += differences(camera, force, config.controller.vehicle)
     return found
 
 
@@ -106,6 +119,7 @@ def bag_text(found: BagFlight) -> list[str]:
         reasons = sorted(counts.items(), key=lambda each: -each[1])
         lines.append(f"{title}: {'nothing' if not reasons else ''}".rstrip())
         lines += [f"  {count} times  {reason}" for reason, count in reasons[:MOST_REASONS]]
+    lines += [f"tf_static: {name} = {position} from the base frame" for name, position in found.poses.items()]
     return lines + [f"the bag: {each}" for each in found.differences]
 
 

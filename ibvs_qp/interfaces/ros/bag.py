@@ -6,11 +6,13 @@ import contextlib
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.interfaces.ros.latest_samples import LatestSamples
 from ibvs_qp.interfaces.ros.recording import Recording
+from ibvs_qp.interfaces.ros.static_poses import TF, TF_TOPIC, StaticPoses
 from ibvs_qp.interfaces.ros.topics import ACCEPTED, CAMERA, SAMPLES, Topics
 from ibvs_qp.measurement import RgbdFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
@@ -33,6 +35,8 @@ class Bag:
     Attributes:
         held: Samples of the last pass, with the messages that were left out.
         differences: Of the last whole pass, in words: counts that differ from those stated, missing or cut files.
+        frame_ids: Frames of the sensors in the last pass, by role.
+        poses: Of the last pass: tree of ``/tf_static``.
 
     Args:
         path: Folder of the bag, or a single file in MCAP or SQLite.
@@ -42,6 +46,7 @@ class Bag:
     def __init__(self, path: str | Path, topics: Topics | None = None) -> None:
         self.path, self.topics = Path(path), topics or Topics()
         self.held, self.differences = LatestSamples(self.topics), list[str]()
+        self.frame_ids, self.poses = dict[str, str](), StaticPoses(())
 
     def sensor_frames(self, period_s: float = 0.004, distortion: tuple[float, ...] = ()) -> Iterator[SensorFrame]:
         """Frames for `ibvs_qp.Pilot.step`; without pictures where the bag has no topic of colour.
@@ -88,14 +93,19 @@ class Bag:
             roles: Roles to read.
             camera: Further ones, where the bag has the topic of the colour pictures.
         """
-        self.held, self.differences = LatestSamples(self.topics), []
+        self.held, self.differences, self.frame_ids = LatestSamples(self.topics), [], {}
+        transforms: list[Any] = []
         with contextlib.closing(Recording(self.path)) as recording:
             if any(each.topic == self.topics.color for each in recording.channels):
                 roles = (*roles, *camera)
             names = self.topics.names(roles)
             for role, name in names.items():
                 self._check(recording, role, name)
-            for message in recording.messages(set(names.values())):
+            for message in recording.messages({*names.values(), TF_TOPIC}):
+                if message.channel.topic == TF_TOPIC and message.channel.type_name == TF:
+                    with contextlib.suppress(Exception):
+                        transforms.append(recording.decode(message))
+                        self.poses = StaticPoses(transforms)
                 for role in (role for role, name in names.items() if name == message.channel.topic):
                     if message.channel.type_name not in ACCEPTED[role]:
                         self.held.ignore(role, "type is another one")
@@ -106,6 +116,8 @@ class Bag:
                         self.held.ignore(role, "undecodable")
                         continue
                     if self.held.add(role, value):
+                        if role not in self.frame_ids and hasattr(value, "header"):
+                            self.frame_ids[role] = value.header.frame_id
                         yield role
             self.held.finish()
             self.differences = recording.differences

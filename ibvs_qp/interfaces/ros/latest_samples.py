@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.interfaces.ros import pictures, samples
+from ibvs_qp.interfaces.ros.attitude_filter import AttitudeFilter
 from ibvs_qp.interfaces.ros.messages import BadMessage, from_ros
 from ibvs_qp.interfaces.ros.topics import MOTION, Topics
 from ibvs_qp.measurement import RgbdFrame, SensorFrame, channels
@@ -49,6 +50,7 @@ class LatestSamples:
         self._waiting: dict[str, deque[tuple[int, Any]]] = {name: deque() for name in ("color", "depth")}
         self._picture: RgbdFrame | None = None
         self._paired_ns = -1
+        self._filter = AttitudeFilter(topics.attitude_filter_s) if topics.attitude_filter_s > 0.0 else None
 
     @np.errstate(all="ignore")  # a host may have numpy raise for the NaN of a message
     def add(self, role: str, value: Any) -> bool:
@@ -102,8 +104,15 @@ class LatestSamples:
         if (before := self.last.get(role)) is not None and 0 <= before.stamp_ns - sample.stamp_ns < CLOCK_SET_NS:
             raise BadMessage("not newer than the one before")
         if role == "imu" and not self._topics.attitude:
-            self.last["attitude"] = samples.attitude(value)
+            self.last["attitude"] = self._attitude(value, sample)
         self.last[role] = sample
+
+    def _attitude(self, value: Any, sample: samples.Sample) -> samples.Sample:
+        """Attitude of an IMU's message, or of the filter where one is set."""
+        if self._filter is None:
+            return samples.attitude(value)
+        values = sample.values["angular_velocity"], sample.values["specific_force"]
+        return samples.Sample(sample.stamp_ns, {"attitude": self._filter.update(sample.stamp_ns, *values)})
 
     def _add_picture(self, role: str, value: Any) -> None:
         """Keep a picture, and complete the pair of the nearest stamps."""

@@ -60,7 +60,7 @@ def attitude(value: Any) -> Sample:
     if value.__msgtype__ == VEHICLE_ATTITUDE:
         return Sample(from_px4(value.timestamp_sample), {"attitude": _unit(value.q)})
     if value.orientation_covariance[0] == ABSENT:
-        raise BadMessage("has no orientation")
+        raise BadMessage("has no orientation: name a topic as attitude, or set attitude_filter_s")
     ros = value.orientation
     return Sample(from_ros(value.header.stamp), {"attitude": swap_attitude(_unit((ros.w, ros.x, ros.y, ros.z)))})
 

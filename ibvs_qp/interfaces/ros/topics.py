@@ -48,6 +48,14 @@ class Topics:
 
     imu: str = setting("/imu/data", "gyro and accelerometer: sensor_msgs/Imu, or px4_msgs/SensorCombined")
     attitude: str = setting("", "px4_msgs/VehicleAttitude or sensor_msgs/Imu; empty for the orientation in imu")
+    attitude_filter_s: float = setting(
+        0.0,
+        "time constant of a complementary filter of gyro and accelerometer, where the IMU has no orientation; 0: none",
+        unit="s",
+        why="1 s follows a hover; a lasting acceleration leans it",
+        low=0.0,
+        high=100.0,
+    )
     wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
     height_rate: str = setting("", "rate of climb: geometry_msgs/TwistStamped, linear.z upwards; empty for none")
     color: str = setting("/camera/camera/color/image_raw", "colour: Image of 8 bits per channel, or CompressedImage")
@@ -62,6 +70,7 @@ class Topics:
     rectified: bool = setting(
         False, "pictures are rectified (image_rect): their camera is P of camera_info, and they have no lens"
     )
+    base_frame: str = setting("base_link", "frame of /tf_static at the vehicle's body, front-left-up")
     wrench_axes: str = choice("flu", "axes of the force sensor: front-left-up or front-right-down", ("flu", "frd"))
     wrench_on: str = choice(
         "tool", "whom the reported wrench acts on; a push reads +x on the tool", ("tool", "vehicle")
