@@ -45,6 +45,8 @@ class Vehicle:
     """Write PX4's parameters CA_ROTORn_* to this file."""
     toml: Annotated[Path | None, optional("FILE")] = None
     """Write the vehicle as a TOML file with [vehicle], missing keys as comments."""
+    mjcf: Annotated[Path | None, optional("FILE")] = None
+    """Write the vehicle as an MJCF file that MuJoCo's viewer opens."""
     picture: Annotated[Path | None, optional("FILE")] = None
     """Draw the vehicle and its picture in contact to this PNG, PDF or SVG file."""
     json: Annotated[bool, flag] = False
@@ -74,13 +76,17 @@ class Vehicle:
             self.px4.write_text(to_px4(vehicle.geometry, vehicle.thrust_max.tolist()), encoding="utf-8")
         if self.toml is not None:
             self.toml.write_text(vehicle_toml(given), encoding="utf-8")
+        if self.mjcf is not None:
+            from sim.vehicles.mjcf_export import vehicle_mjcf
+
+            self.mjcf.write_text(vehicle_mjcf(vehicle), encoding="utf-8")
         if self.picture is not None:
             _draw(vehicle, config, self.picture)
         if self.json:
             print(as_json(_summary(given, found, config, check)))
         else:
             _show(given, found, config)
-            for file in filter(None, (self.px4, self.toml, self.picture)):
+            for file in filter(None, (self.px4, self.toml, self.mjcf, self.picture)):
                 print(f"Written: {file}")
             for warning in check.warnings:
                 print(f"Warning: {warning}.")

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 import re
 import xml.etree.ElementTree as ET  # nosec B405
@@ -133,7 +134,7 @@ def _vehicle(model: mujoco.MjModel, urdf: ET.Element | None) -> ModelVehicle:
     for field, pattern in (("tip_position_m", _TIP), ("force_torque_position_m", _SENSOR)):
         if (place := _place(model, data, pattern)) is not None:
             values[field] = tuple((to_body @ (place - centre)).tolist())
-    values |= _camera(model, data, centre, to_body)
+    values |= _camera(model, data, centre, to_body) | _tool(model, data, centre, to_body) | _custom(model)
     kind = "MJCF" if urdf is None else "URDF"
     return ModelVehicle(vehicle=VehicleParams(**values), kind=kind, stated=frozenset(values), notes=notes)
 
@@ -217,10 +218,47 @@ def _camera(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_b
     (width, height), default = (int(entry) for entry in model.cam_resolution[0]), VehicleParams().camera_size_px
     if min(width, height) < 32:
         width, height = default
+    size = np.array(model.cam_sensorsize[0], float)
+    if size.any():
+        pixels = np.array(model.cam_intrinsic[0], float).reshape(2, 2) / size * (width, height)
+        (fx, fy), (cx, cy) = pixels[0].tolist(), (pixels[1] + 0.5 * np.array((width - 1, height - 1))).tolist()
+        return _of_camera(data, centre, to_body, turn, (width, height), (fx, fy, cx, cy))
     focal = 0.5 * height / math.tan(0.5 * math.radians(float(model.cam_fovy[0])))
+    intrinsics = focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)
+    return _of_camera(data, centre, to_body, turn, (width, height), intrinsics)
+
+
+def _of_camera(
+    data: mujoco.MjData,
+    centre: np.ndarray,
+    to_body: np.ndarray,
+    turn: np.ndarray,
+    size: tuple[int, int],
+    intrinsics: tuple[float, float, float, float],
+) -> dict[str, Any]:
     return {
         "camera_position_m": tuple((to_body @ (data.cam_xpos[0] - centre)).tolist()),
         "camera_turn_deg": tuple(turn.tolist()),
-        "camera_size_px": (width, height),
-        "camera_intrinsics_px": (focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)),
+        "camera_size_px": size,
+        "camera_intrinsics_px": intrinsics,
     }
+
+
+def _custom(model: mujoco.MjModel) -> dict[str, Any]:
+    """Fields that stand as custom numbers ``vehicle.FIELD``."""
+    fields, found = {field.name for field in dataclasses.fields(VehicleParams)}, {}
+    for index in range(model.nnumeric):
+        name = model.numeric(index).name.removeprefix("vehicle.")
+        if name in fields and model.numeric(index).name != name:
+            values = np.array(model.numeric(index).data, float).tolist()
+            found[name] = values[0] if len(values) == 1 else tuple(values)
+    return found
+
+
+def _tool(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_body: np.ndarray) -> dict[str, Any]:
+    """Mass and centre of mass of the body named tool."""
+    tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool")
+    if tool < 0 or model.body_mass[tool] <= 0.0:
+        return {}
+    place = tuple((to_body @ (data.xipos[tool] - centre)).tolist())
+    return {"tool_mass_kg": float(model.body_mass[tool]), "tool_position_m": place}

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy_stand_in
 from scipy.spatial.transform import Rotation
 
 from ibvs_qp import ControllerConfig, Measurement, PaperController, Reference
@@ -24,7 +25,9 @@ NUMBER = re.compile(r"-?\d+\.\d+")
 WITHOUT_OPENCV = ("plain_python", "own_limit", "own_task")
 #: Modules of the others.
 SHARED = ("rigid_body", "drawn_camera")
-EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py") if file.stem not in SHARED)
+#: Needs ROS: it has a test of its own.
+ROS = "ros2_node"
+EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py") if file.stem not in (*SHARED, ROS))
 #: Runs a script where the simulator and everything that draws cannot be imported.
 ALONE = """
 import importlib.abc, os, runpy, sys
@@ -210,3 +213,36 @@ def test_own_controller_adds_a_policy_to_the_analytic_law(tmp_path: Path) -> Non
     analytic = PaperController(ControllerConfig()).step(hover, Reference()).thrusts
     assert len(level) == 6 and len(set(level)) == 1 and 8.0 < level[0] < 14.0
     assert 0.0 < np.abs(learned - analytic).max() <= example["SHARE_N"]
+
+
+def test_the_ros_node_answers_its_sensors_with_thrusts(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("rosbags", reason="needs the extra ros")
+    from ibvs_qp.interfaces.ros import pictures, samples
+    from ibvs_qp.interfaces.ros.topics import Topics
+
+    rclpy_stand_in.install(monkeypatch)
+    script = runpy.run_path(str(ROOT / "examples" / f"{ROS}.py"))
+    assert len((ROOT / "examples" / f"{ROS}.py").read_text().splitlines()) <= 60
+    topics = Topics()
+    node = script["PilotNode"](topics)
+    ((period_s, tick),) = node.timers
+    names = topics.names(("imu", "wrench", "color", "depth", "camera_info"))
+    assert period_s == 0.004 and set(node.taken) == set(names.values())
+    rgb, depth = np.full((60, 106, 3), 120, np.uint8), np.full((60, 106), 0.9, np.float32)
+    weight = np.array([0.0, 0.0, -0.35 * 9.81, 0.0, 0.25 * 0.35 * 9.81, 0.0])
+    for number in range(1, 101):
+        node.now_ns = stamp = 10**9 + number * 4_000_000
+        if number == 50:
+            node.receive(topics.camera_info, pictures.from_intrinsics((78.0, 78.0, 52.5, 29.5), (60, 106), stamp))
+            node.receive(topics.color, pictures.from_rgb(rgb, stamp))
+            node.receive(topics.depth, pictures.from_depth(depth, stamp))
+        tick()
+        still = np.array([0.0, 0.0, -9.81])
+        node.receive(topics.imu, samples.to_imu(stamp, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), still))
+        node.receive(topics.wrench, samples.to_wrench(stamp, weight, topics.wrench_axes, topics.wrench_on))
+    sent = node.published["/rotor_thrusts"]
+    assert len(sent) == 99 and not node.held.ignored and node.held.pairs == 1 and node.prepared
+    lift = 6 * np.cos(np.radians(30.0)) * np.mean(sent[-1].data)
+    assert lift == pytest.approx(6.0 * 9.81, rel=0.05)
+    node.receive(topics.imu, samples.to_imu(1, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), still))
+    assert list(node.held.ignored) == ["imu: stamp is not of this computer's clock, or too old"]

@@ -63,6 +63,12 @@ def _zero(description: Any) -> Any:
     return np.zeros(details[1] if kind == Nodetype.ARRAY else 0, details[0][1][0])
 
 
+def type_of(value: Any) -> str:
+    """Type of a message, also of one of ROS's own Python classes: "sensor_msgs/msg/Imu"."""
+    kind = type(value)
+    return getattr(value, "__msgtype__", "") or f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+
+
 def decoded(data: bytes, name: str) -> Any:
     """A message from CDR, or BadMessage."""
     try:

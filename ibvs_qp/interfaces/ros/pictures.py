@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.interfaces.ros import compressed
-from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BadMessage, header, message
+from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BadMessage, header, message, type_of
 from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
 
 #: Channels of the colour encodings, in the order red, green, blue.
@@ -45,7 +45,7 @@ class Camera(NamedTuple):
 
 def to_rgb(image: Any) -> np.ndarray:
     """Colour of an ``Image`` or ``CompressedImage``, uint8 (H, W, 3)."""
-    if image.__msgtype__ == COMPRESSED_IMAGE:
+    if type_of(image) == COMPRESSED_IMAGE:
         return compressed.colour(image, LONGEST_SIDE)
     if image.encoding in _HALF_COLOURS:
         pairs = _rows(image, 2).reshape(image.height, image.width, 2)
@@ -61,7 +61,7 @@ def to_rgb(image: Any) -> np.ndarray:
 
 def to_depth(image: Any) -> np.ndarray:
     """Depth of an ``Image`` or ``CompressedImage`` [m], float32 (H, W), 0 where invalid."""
-    if image.__msgtype__ == COMPRESSED_IMAGE:
+    if type_of(image) == COMPRESSED_IMAGE:
         return compressed.depth(image, LONGEST_SIDE)
     if image.encoding not in _DEPTHS:
         raise BadMessage("encoding is not 16UC1 or 32FC1")

@@ -23,6 +23,7 @@ from ibvs_qp.interfaces.ros.messages import (
     from_ros,
     header,
     message,
+    type_of,
 )
 from ibvs_qp.interfaces.ros.topics import TWIST, Topics
 
@@ -43,7 +44,7 @@ class Sample(NamedTuple):
 
 def inertial(value: Any) -> Sample:
     """Angular velocity and specific force of a ``sensor_msgs/Imu`` or ``px4_msgs/SensorCombined``."""
-    if value.__msgtype__ == SENSOR_COMBINED:
+    if type_of(value) == SENSOR_COMBINED:
         if value.accelerometer_timestamp_relative == NO_ACCELEROMETER:
             raise BadMessage("accelerometer is invalid")
         stamp, rate, force = from_px4(value.timestamp), _finite(value.gyro_rad), _finite(value.accelerometer_m_s2)
@@ -57,7 +58,7 @@ def inertial(value: Any) -> Sample:
 
 def attitude(value: Any) -> Sample:
     """Attitude of B in I of a ``px4_msgs/VehicleAttitude`` or ``sensor_msgs/Imu``."""
-    if value.__msgtype__ == VEHICLE_ATTITUDE:
+    if type_of(value) == VEHICLE_ATTITUDE:
         return Sample(from_px4(value.timestamp_sample), {"attitude": _unit(value.q)})
     if value.orientation_covariance[0] == ABSENT:
         raise BadMessage("has no orientation: name a topic as attitude, or set attitude_filter_s")

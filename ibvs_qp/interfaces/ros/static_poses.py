@@ -69,8 +69,8 @@ def differences(camera: StaticPose | None, force: StaticPose | None, vehicle: Ve
     found = []
     if camera is not None:
         turn = Rotation.from_rotvec(vehicle.camera_turn_deg, degrees=True)
-        believed = turn * Rotation.from_matrix(R_BODY_CAMERA)
-        angle = np.degrees((believed.inv() * camera.rotation).magnitude())
+        assumed_axes = turn * Rotation.from_matrix(R_BODY_CAMERA)
+        angle = np.degrees((assumed_axes.inv() * camera.rotation).magnitude())
         if angle > ANGLE_DEG:
             found.append(f"the camera of tf_static is turned by {angle:.1f} deg from that of the vehicle")
     if camera is not None and force is not None:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from allocation import TAROT_T960
+from ibvs_qp import preset
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.interfaces.px4.rotors import to_px4
+from ibvs_qp.pilot.vehicle_check import vehicle_actuation
+from sim.commands.cli import main
+from sim.vehicles.generator import random_vehicle
+from sim.vehicles.mjcf_export import vehicle_mjcf
 from sim.vehicles.vehicle_file import VehicleFile, read_vehicle
 
 T960 = VehicleParams()
@@ -118,3 +126,50 @@ def test_thrusts_of_px4_are_those_of_the_file(tmp_path: Path) -> None:
     assert found.kind == "PX4 parameters" and found.stated == {"geometry", "thrust_max_n"}
     np.testing.assert_allclose(found.vehicle.thrust_max, 30.0 + np.arange(6))
     assert found.assumptions[0].startswith("PX4 parameters without mass_kg, inertia_kg_m2")
+
+
+VEHICLES = {"T960": T960, "octorotor": preset("octorotor_qp").controller.vehicle}
+VEHICLES |= {f"seed {seed}": random_vehicle(seed) for seed in range(10)}
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_mjcf_holds_the_hover_by_itself_and_comes_back(name: str, tmp_path: Path) -> None:
+    vehicle, file = VEHICLES[name], tmp_path / "vehicle.xml"
+    file.write_text(vehicle_mjcf(vehicle))
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    np.testing.assert_allclose(data.ctrl, vehicle_actuation(vehicle).hover)
+    mujoco.mj_step(model, data, 2000)
+    assert np.linalg.norm(data.qpos[:3] - (0.0, 0.0, 1.0)) < 1e-3
+    assert 2.0 * np.degrees(np.linalg.norm(data.qpos[4:7])) < 0.1
+    found = read_vehicle(file)
+    assert not found.assumed and not found.notes
+    for field in dataclasses.fields(VehicleParams):
+        ours, theirs = (getattr(each, field.name) for each in (vehicle, found.vehicle))
+        if field.name == "geometry":
+            for part in ("positions", "axes", "spins", "torque_ratios"):
+                np.testing.assert_allclose(getattr(theirs, part), getattr(ours, part), atol=1e-9, err_msg=part)
+            continue
+        ours = np.broadcast_to(ours, np.shape(theirs))
+        np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-9, err_msg=field.name)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_px4s_parameters_come_back_in_single_precision(name: str, tmp_path: Path) -> None:
+    vehicle, file = VEHICLES[name], tmp_path / "vehicle.params"
+    file.write_text(to_px4(vehicle.geometry, vehicle.thrust_max.tolist()))
+    found = read_vehicle(file)
+    assert found.stated == {"geometry", "thrust_max_n"} and "mass_kg" in found.assumed
+    for part in ("positions", "axes", "spins", "torque_ratios"):
+        ours, theirs = (getattr(each.geometry, part) for each in (vehicle, found.vehicle))
+        np.testing.assert_allclose(theirs, ours, atol=1e-7, err_msg=part)
+    np.testing.assert_allclose(found.vehicle.thrust_max, vehicle.thrust_max, rtol=1e-7)
+
+
+def test_the_command_writes_all_formats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [f"--{kind}={tmp_path / kind}" for kind in ("mjcf", "px4", "toml")]
+    assert main(["vehicle", "octorotor_qp", *words]) == 0
+    assert capsys.readouterr().out.count("Written: ") == 3
+    kinds = {kind: read_vehicle(tmp_path / kind).kind for kind in ("mjcf", "px4", "toml")}
+    assert kinds == {"mjcf": "MJCF", "px4": "PX4 parameters", "toml": "TOML"}
