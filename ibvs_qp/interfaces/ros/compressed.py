@@ -60,6 +60,9 @@ def _size(data: bytes) -> tuple[int, int]:
     try:
         if data.startswith(_PNG):
             width, height = struct.unpack_from(">II", data, 16)
+            place = len(_PNG)
+            while data[place + 4 : place + 8] != b"IEND":  # OpenCV reserves memory for any stated length
+                place += 12 + int(struct.unpack_from(">I", data, place)[0])
             return width, height
         if data.startswith(_JPEG):
             place = 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import heapq
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -17,7 +18,6 @@ from ibvs_qp.interfaces.ros.storage import (
     MCAP_MAGIC,
     ROS1_MAGIC,
     SQLITE_MAGIC,
-    Channel,
     McapStorage,
     Recorded,
     open_storage,
@@ -63,7 +63,6 @@ class Recording:
     def __init__(self, path: Path) -> None:
         typestore()  # names the extra where it is missing
         self._path, self._stack, self.differences = path, contextlib.ExitStack(), list[str]()
-        self._decoders: dict[Channel, Callable[[bytes], Any]] = {}
         metadata = self._metadata() if path.is_dir() else {}
         files = self._files(metadata) if path.is_dir() else [path]
         self._storages = []
@@ -103,9 +102,7 @@ class Recording:
         Raises:
             Exception: Of the decoder, for bytes that are no message of the type.
         """
-        if message.channel not in self._decoders:
-            self._decoders[message.channel] = _decoder(message.channel)
-        return self._decoders[message.channel](message.data)
+        return _decoder(*message.channel[1:])(message.data)
 
     @contextlib.contextmanager
     def _one_line(self) -> Iterator[None]:
@@ -159,12 +156,13 @@ def _counts(metadata: dict[str, Any]) -> Counter[str]:
     return counts
 
 
-def _decoder(channel: Channel) -> Callable[[bytes], Any]:
+@functools.lru_cache(maxsize=64)
+def _decoder(name: str, form: str, definition: str) -> Callable[[bytes], Any]:
     from rosbags.typesys import Stores, get_typestore
 
-    ours, name = typestore(), channel.type_name
+    ours = typestore()
     try:
-        types = {**ours.fielddefs, **_defined(channel)}
+        types = {**ours.fielddefs, **_defined(name, form, definition)}
         store = get_typestore(Stores.EMPTY)
         store.register({each: types[each] for each in _needed(types, name)})
     except Exception:  # a definition without use spoils nothing but itself
@@ -173,17 +171,17 @@ def _decoder(channel: Channel) -> Callable[[bytes], Any]:
     return lambda data: store.deserialize_cdr(data, name)
 
 
-def _defined(channel: Channel) -> dict[str, Any]:
+def _defined(name: str, form: str, definition: str) -> dict[str, Any]:
     """Types of a channel's definition, by name."""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-    if channel.format == "ros2msg":
-        return dict(get_types_from_msg(channel.definition, channel.type_name))
+    if form == "ros2msg":
+        return dict(get_types_from_msg(definition, name))
     found: dict[str, Any] = {}
-    if channel.format == "ros2idl":
+    if form == "ros2idl":
         rule = "=" * 80 + "\n"
-        parts = [part.split("\n", 1)[-1] for part in channel.definition.split(rule) if part.startswith("IDL: ")]
-        for part in parts or [channel.definition]:
+        parts = [part.split("\n", 1)[-1] for part in definition.split(rule) if part.startswith("IDL: ")]
+        for part in parts or [definition]:
             found |= get_types_from_idl(part)
     return found
 

@@ -151,6 +151,8 @@ class McapStorage:
             self._schemas[schema.id] = (schema.name, schema.encoding, schema.data.decode(errors="replace"))
         elif opcode == _CHANNEL:
             channel = records.Channel.read(stream)
+            if channel.schema_id not in self._schemas and channel.schema_id:
+                return  # a summary need not repeat the schemas: the chunk has both
             name, kind, text = self._schemas.get(channel.schema_id, ("", "", ""))
             self._channels.setdefault(channel.id, Channel(channel.topic, name, kind if text else "", text))
         else:
