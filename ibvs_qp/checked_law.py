@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -45,6 +45,13 @@ class CheckedLaw(ABC):
     """
 
     setpoints: Setpoints
+    _make: Callable[[], Any]
+
+    def __new__(cls, *arguments: Any, **named: Any) -> Self:
+        """Keep the arguments of the class, also of a subclass with its own, for copies."""
+        made = super().__new__(cls)
+        made._make = functools.partial(cls, *arguments, **named)
+        return made
 
     def __init__(self, config: ControllerConfig) -> None:
         self.config = self.initial_config = config
@@ -75,12 +82,8 @@ class CheckedLaw(ABC):
         put_state(self, self.initial_config, state)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are built anew from the arguments, and continue from the state."""
-        return copied, (functools.partial(type(self), *self._arguments()[0], **self._arguments()[1]), self.state())
-
-    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        """Arguments that build it; a subclass with others has its own."""
-        return (self.initial_config,), {}
+        """Copies and pickles are built anew from the same arguments, and continue from the state."""
+        return copied, (self._make, self.state())
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(

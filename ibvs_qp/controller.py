@@ -112,7 +112,7 @@ class HybridController(CheckedLaw):
         ConfigError: When a row is not affine in the thrusts, two rows share a name, or the configuration is refused.
     """
 
-    CONSTANTS = ("problem", "_rows")
+    CONSTANTS = ("problem",)
     problem_kind: ClassVar[type[QpProblem]] = QpProblem
     engine_kind: ClassVar[type[QpEngine]] = QpEngine
 
@@ -121,13 +121,9 @@ class HybridController(CheckedLaw):
     ) -> None:
         super().__init__(config or ControllerConfig())
         self.problem = qp_problem(self.config, tasks, limits, self.problem_kind)
-        self._rows = {"tasks": tuple(tasks), "limits": tuple(limits)}
         self.setpoints = Setpoints(self.problem.model, self.problem.values)
         self.engine = self.engine_kind(self.problem, self.config.solver, ProgramData(self.problem, self.setpoints.step))
         self.reset()
-
-    def _arguments(self) -> tuple[tuple[Any, ...], dict[str, Any]]:
-        return (self.initial_config,), self._rows
 
     def reset(self) -> None:
         """Restore the state after construction, bit-identical."""

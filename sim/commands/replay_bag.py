@@ -79,6 +79,7 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")  # the differences are printed
         frames = bag.sensor_frames(config.controller.tick_s, config.camera.distortion)
+        stack.callback(frames.close)
         first = next(frames, None)  # a bag that is refused leaves no log
         recorder = stack.enter_context(Recorder(log, pilot))
         for frame in itertools.chain(() if first is None else (first,), frames):

@@ -113,6 +113,10 @@ class Fields:
         rows = self._rows(law, variant, params)
         return f"{rows['completed'].sum()} of {rows.height}"
 
+    def kept(self, law: str, variant: str, **params: Any) -> int:
+        """Slides held."""
+        return int(self._rows(law, variant, params)["slide_held"].drop_nulls().sum())
+
     def held(self, law: str, variant: str, **params: Any) -> str:
         """Slides held, of all flights; empty for a cell that does not slide."""
         rows = self._rows(law, variant, params)

@@ -123,7 +123,7 @@ def _camera(vehicle: VehicleParams) -> str:
     turn = Rotation.from_rotvec(vehicle.camera_turn_deg, degrees=True).as_matrix()
     axes = FLIP[:, None] * (turn @ R_BODY_CAMERA)
     (width, height), (fx, fy, cx, cy) = vehicle.camera_size_px, vehicle.camera_intrinsics_px
-    principal = numbers(cx - 0.5 * (width - 1), cy - 0.5 * (height - 1))
+    principal = numbers(0.5 * (width - 1) - cx, 0.5 * (height - 1) - cy)  # MuJoCo's offsets are those of the picture
     return (
         f'<camera name="camera" pos="{numbers(FLIP * vehicle.camera_position_m)}" '
         f'xyaxes="{numbers(axes[:, 0], -axes[:, 1])}" resolution="{width} {height}" focalpixel="{numbers(fx, fy)}" '

@@ -221,7 +221,7 @@ def _camera(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_b
     size = np.array(model.cam_sensorsize[0], float)
     if size.any():
         pixels = np.array(model.cam_intrinsic[0], float).reshape(2, 2) / size * (width, height)
-        (fx, fy), (cx, cy) = pixels[0].tolist(), (pixels[1] + 0.5 * np.array((width - 1, height - 1))).tolist()
+        (fx, fy), (cx, cy) = pixels[0].tolist(), (0.5 * np.array((width - 1, height - 1)) - pixels[1]).tolist()
         return _of_camera(data, centre, to_body, turn, (width, height), (fx, fy, cx, cy))
     focal = 0.5 * height / math.tan(0.5 * math.radians(float(model.cam_fovy[0])))
     intrinsics = focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)

@@ -240,3 +240,18 @@ def test_copies_and_pickles_continue(kind: str, copy_of: Callable[[Any], Any]) -
         if tick in (0, 20):
             other = copy_of(flown)
         assert numbers(step(other, tick)) == numbers(step(flown, tick)), tick
+
+
+class OwnConstructor(HybridController):
+    """A law of a user's whose constructor has other arguments."""
+
+    def __init__(self, gain: float, *, config: ControllerConfig) -> None:
+        super().__init__(config)
+        self.gain = gain
+
+
+def test_a_subclass_with_its_own_constructor_is_copied() -> None:
+    config = CASES["rotor_loss"].config().controller
+    flown = OwnConstructor(0.5, config=config)
+    for other in (copy.deepcopy(flown), pickle.loads(pickle.dumps(flown))):
+        assert type(other) is OwnConstructor and other.gain == 0.5 and other.config == config

@@ -50,8 +50,9 @@ class AttitudeFilter:
                 self._stamp_ns = -1
                 raise BadMessage("no vertical to begin the attitude from")
             x, y, z = force
-            angles = [math.atan2(x, math.hypot(y, z)), math.atan2(-y, -z)]
-            self._attitude = Rotation.from_euler("YX", angles)
+            yaw = float(self._attitude.as_euler("ZYX")[0])
+            angles = [yaw, math.atan2(x, math.hypot(y, z)), math.atan2(-y, -z)]
+            self._attitude = Rotation.from_euler("ZYX", angles)
         else:
             turn = np.array(rate, float)
             if calm:

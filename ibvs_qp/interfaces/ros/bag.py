@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from ibvs_qp.command import Command
 from ibvs_qp.config.errors import ConfigError, shown
@@ -46,9 +45,11 @@ class Bag:
     def __init__(self, path: str | Path, topics: Topics | None = None) -> None:
         self.path, self.topics = Path(path), topics or Topics()
         self.held, self.differences = LatestSamples(self.topics), list[str]()
-        self.frame_ids, self.poses = dict[str, str](), StaticPoses(())
+        self.frame_ids, self.poses = dict[str, str](), StaticPoses()
 
-    def sensor_frames(self, period_s: float = 0.004, distortion: tuple[float, ...] = ()) -> Iterator[SensorFrame]:
+    def sensor_frames(
+        self, period_s: float = 0.004, distortion: tuple[float, ...] = ()
+    ) -> Generator[SensorFrame, None, None]:
         """Frames for `ibvs_qp.Pilot.step`; without pictures where the bag has no topic of colour.
 
         Args:
@@ -94,7 +95,7 @@ class Bag:
             camera: Further ones, where the bag has the topic of the colour pictures.
         """
         self.held, self.differences, self.frame_ids = LatestSamples(self.topics), [], {}
-        transforms: list[Any] = []
+        self.poses = StaticPoses()
         with contextlib.closing(Recording(self.path)) as recording:
             if any(each.topic == self.topics.color for each in recording.channels):
                 roles = (*roles, *camera)
@@ -104,8 +105,7 @@ class Bag:
             for message in recording.messages({*names.values(), TF_TOPIC}):
                 if message.channel.topic == TF_TOPIC and message.channel.type_name == TF:
                     with contextlib.suppress(Exception):
-                        transforms.append(recording.decode(message))
-                        self.poses = StaticPoses(transforms)
+                        self.poses.add(recording.decode(message))
                 for role in (role for role, name in names.items() if name == message.channel.topic):
                     if message.channel.type_name not in ACCEPTED[role]:
                         self.held.ignore(role, "type is another one")
@@ -116,8 +116,8 @@ class Bag:
                         self.held.ignore(role, "undecodable")
                         continue
                     if self.held.add(role, value):
-                        if role not in self.frame_ids and hasattr(value, "header"):
-                            self.frame_ids[role] = value.header.frame_id
+                        if role not in self.frame_ids:
+                            self.frame_ids[role] = str(getattr(getattr(value, "header", None), "frame_id", ""))
                         yield role
             self.held.finish()
             self.differences = recording.differences

@@ -14,6 +14,8 @@ from ibvs_qp.interfaces.ros.messages import BadMessage
 _PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 #: Markers of a JPEG whose segment has the size: start of frame, in all its kinds.
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+#: Markers without a segment: fill bytes, TEM and restarts.
+_BARE = frozenset((0xFF, 0x01, *range(0xD0, 0xD9)))
 #: Head of compressedDepth: kind, and the two parameters of the quantised inverse depth.
 _DEPTH_HEAD = struct.Struct("<iff")
 
@@ -70,6 +72,9 @@ def _size(data: bytes) -> tuple[int, int]:
                 if data[place + 1] in _FRAMES:
                     height, width = struct.unpack_from(">HH", data, place + 5)
                     return width, height
+                if data[place + 1] in _BARE:
+                    place += 1 if data[place + 1] == 0xFF else 2
+                    continue
                 place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
     except (struct.error, IndexError):
         raise BadMessage("compressed picture is damaged") from None

@@ -17,7 +17,9 @@ from ibvs_qp.validation.clock import LEAD_NS
 
 #: Longest time by their stamps that colour and depth wait for their partner [ns]: aligned depth comes 30 to 70 ms late.
 WAITING_NS = 250_000_000
-#: A stamp that goes back by more is of a clock that was set, and not of a late sample [ns].
+#: Most pictures of a kind that wait: 90 Hz for that time, with a margin.
+MOST_WAITING = 32
+#: In a recording a stamp that goes back by more is of a clock that was set, and not of a late sample [ns].
 CLOCK_SET_NS = 1_000_000_000
 #: A stamp of the system's clock lies at most this far behind it [ns].
 LATEST_NS = 1_000_000_000
@@ -101,11 +103,17 @@ class LatestSamples:
     def _add_sample(self, role: str, value: Any) -> None:
         sample = samples.READERS[role](value, self._topics)
         self.check_clock(sample.stamp_ns)
-        if (before := self.last.get(role)) is not None and 0 <= before.stamp_ns - sample.stamp_ns < CLOCK_SET_NS:
+        if (before := self.last.get(role)) is not None and self._late(sample.stamp_ns, before.stamp_ns):
             raise BadMessage("not newer than the one before")
         if role == "imu" and not self._topics.attitude:
             self.last["attitude"] = self._attitude(value, sample)
         self.last[role] = sample
+
+    def _late(self, stamp_ns: int, before_ns: int) -> bool:
+        """Whether a stamp is not newer than an earlier one, whose clock was not set back since."""
+        if self._clock is not None:
+            return stamp_ns <= before_ns <= self._clock() + LEAD_NS
+        return 0 <= before_ns - stamp_ns < CLOCK_SET_NS
 
     def _attitude(self, value: Any, sample: samples.Sample) -> samples.Sample:
         """Attitude of an IMU's message, or of the filter where one is set."""
@@ -119,12 +127,15 @@ class LatestSamples:
         pixels = pictures.to_rgb(value) if role == "color" else pictures.to_depth(value)
         stamp = from_ros(value.header.stamp)
         self.check_clock(stamp)
-        if 0 <= self._paired_ns - stamp < CLOCK_SET_NS:
+        if self._late(stamp, self._paired_ns):
             raise BadMessage("not newer than the last pair")
         own, other = self._waiting[role], self._waiting[partner := "depth" if role == "color" else "color"]
         nearest = min(other, key=lambda each: abs(each[0] - stamp), default=None)
         if nearest is None or abs(nearest[0] - stamp) > round(self._topics.pair_s * 1e9):
             own.append((stamp, pixels))
+            if len(own) > MOST_WAITING:
+                own.popleft()
+                self._forget(role, 1)
             self._drop(role, lambda waiting: stamp - waiting > WAITING_NS or waiting - stamp >= CLOCK_SET_NS)
             return
         self._drop(role, lambda waiting: waiting <= stamp)

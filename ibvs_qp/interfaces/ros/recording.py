@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError, shown
-from ibvs_qp.config.files import open_regular, read_bytes
+from ibvs_qp.config.files import UnreadableFile, open_regular, read_bytes
 from ibvs_qp.interfaces.ros.messages import MOST_ENTRIES, typestore
 from ibvs_qp.interfaces.ros.storage import (
     LARGEST_DATA,
@@ -20,6 +20,7 @@ from ibvs_qp.interfaces.ros.storage import (
     SQLITE_MAGIC,
     McapStorage,
     Recorded,
+    SqliteStorage,
     open_storage,
     unpacked,
 )
@@ -34,15 +35,18 @@ ENDINGS = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".bag")
 def is_bag(path: Path) -> bool:
     """Whether a path is a bag of ROS, and not a log of this package: by profile and schemas, not by its name."""
     if path.is_dir():
-        return any(each.name.endswith(ENDINGS) or each.name == METADATA for each in path.iterdir())
+        return True
     with open_regular(path, LARGEST_DATA) as stream:
         head = stream.read(len(SQLITE_MAGIC))
     if head.startswith((SQLITE_MAGIC, ROS1_MAGIC)):
         return True
     if not head.startswith(MCAP_MAGIC):
         return False
-    with contextlib.closing(McapStorage(path)) as storage:
-        return storage.profile == "ros2" or any(each.format.startswith("ros2") for each in storage.channels)
+    try:
+        with contextlib.closing(McapStorage(path)) as storage:
+            return storage.profile == "ros2" or any(each.format.startswith("ros2") for each in storage.channels)
+    except Exception:  # a damaged file: the reader of logs names the damage
+        return False
 
 
 class Recording:
@@ -63,20 +67,17 @@ class Recording:
     def __init__(self, path: Path) -> None:
         typestore()  # names the extra where it is missing
         self._path, self._stack, self.differences = path, contextlib.ExitStack(), list[str]()
-        metadata = self._metadata() if path.is_dir() else {}
-        files = self._files(metadata) if path.is_dir() else [path]
         self._storages = []
         with self._one_line():
-            for file in files:
+            metadata = self._metadata() if path.is_dir() else {}
+            for file in self._files(metadata) if path.is_dir() else [path]:
                 storage = open_storage(file)
                 self._stack.callback(storage.close)
                 self._storages.append(storage)
                 if storage.damage:
                     self.differences.append(f"{file.name}: {storage.damage}; it was read up to there")
         self.channels = [channel for storage in self._storages for channel in storage.channels]
-        self._stated = [("the file", sum((each.stated for each in self._storages), Counter[str]()))]
-        if counts := _counts(metadata):
-            self._stated.append((METADATA, counts))
+        self._counts = _counts(metadata)
 
     def close(self) -> None:
         """Close every file."""
@@ -84,17 +85,20 @@ class Recording:
 
     def messages(self, topics: set[str]) -> Iterator[Recorded]:
         """Messages of some topics in the order of recording."""
-        read = Counter[str]()
+        read = [Counter[str]() for _ in self._storages]
         with self._one_line():
-            for message in heapq.merge(*(each.messages(topics) for each in self._storages), key=lambda each: each[0]):
-                read[message.channel.topic] += 1
+            streams = (_counted(each, topics, counts) for each, counts in zip(self._storages, read, strict=True))
+            for message in heapq.merge(*streams, key=lambda each: each[0]):
                 yield message._replace(data=unpacked(message.data))
-        for topic in sorted(topics):
-            for source, stated in self._stated:
-                if stated and stated[topic] != read[topic]:
-                    self.differences.append(
-                        f"{topic}: {source} states {stated[topic]} messages, {read[topic]} were read"
-                    )
+        whole = sum(read, Counter[str]())
+        stated = [("the file", each.stated, counts) for each, counts in zip(self._storages, read, strict=True)]
+        for source, promised, counts in [*stated, (METADATA, self._counts, whole)]:
+            self.differences += [
+                f"{topic}: {source} states {promised[topic]} messages, {counts[topic]} were read"
+                for topic in sorted(topics)
+                if promised and promised[topic] != counts[topic]
+            ]
+        self.differences += [text for each in self._storages for text in each.damages.values()]
 
     def decode(self, message: Recorded) -> Any:
         """Decode a message by the definition of its channel, or by ours where it has none that can be used.
@@ -132,7 +136,7 @@ class Recording:
     def _files(self, metadata: dict[str, Any]) -> list[Path]:
         """Storage files of a folder: those of the metadata first."""
         listed = metadata.get("relative_file_paths")
-        names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
+        names = [Path(name).name for name in listed if isinstance(name, str)] if isinstance(listed, list) else []
         beside = sorted(each.name for each in self._path.iterdir() if each.name.endswith(ENDINGS) and each.is_file())
         for name in names:
             if name not in beside:
@@ -141,8 +145,15 @@ class Recording:
             self.differences.append(f"{', '.join(more)}: not in {METADATA}, read as well")
         found = [self._path / name for name in dict.fromkeys((*names, *beside)) if name in beside]
         if not found:
-            raise ConfigError(f"{self._path} is no readable ROS 2 bag: it has no file {', '.join(ENDINGS[:2])}")
+            raise UnreadableFile(self._path, f"it has no file {', '.join(ENDINGS[:2])}")
         return found
+
+
+def _counted(storage: McapStorage | SqliteStorage, topics: set[str], counts: Counter[str]) -> Iterator[Recorded]:
+    """Messages of a file, counted."""
+    for message in storage.messages(topics):
+        counts[message.channel.topic] += 1
+        yield message
 
 
 def _counts(metadata: dict[str, Any]) -> Counter[str]:
@@ -150,8 +161,9 @@ def _counts(metadata: dict[str, Any]) -> Counter[str]:
     counts = Counter[str]()
     try:
         for each in metadata.get("topics_with_message_count") or ():
-            counts[str(each["topic_metadata"]["name"])] += int(each["message_count"])
-    except (TypeError, KeyError, ValueError):
+            if isinstance(name := each["topic_metadata"]["name"], str):
+                counts[name] += int(each["message_count"])
+    except (TypeError, KeyError, ValueError, OverflowError):
         return Counter()
     return counts
 

@@ -37,16 +37,20 @@ class StaticPose:
 class StaticPoses:
     """The tree of ``/tf_static``; a later transform of a frame replaces an earlier one."""
 
-    def __init__(self, messages: Iterable[Any]) -> None:
+    def __init__(self, messages: Iterable[Any] = ()) -> None:
         self._parents: dict[str, tuple[str, Rotation, np.ndarray]] = {}
         for message in messages:
-            for each in message.transforms:
-                turn, move = each.transform.rotation, each.transform.translation
-                quaternion = np.array((turn.x, turn.y, turn.z, turn.w))
-                position = np.array((move.x, move.y, move.z))
-                if np.isfinite(position).all() and 0.9 < np.linalg.norm(quaternion) < 1.1:
-                    parent, child = each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/")
-                    self._parents[child] = parent, Rotation.from_quat(quaternion), position
+            self.add(message)
+
+    def add(self, message: Any) -> None:
+        """Take the transforms of a message."""
+        for each in message.transforms:
+            turn, move = each.transform.rotation, each.transform.translation
+            quaternion = np.array((turn.x, turn.y, turn.z, turn.w))
+            position = np.array((move.x, move.y, move.z))
+            if np.isfinite(position).all() and 0.9 < np.linalg.norm(quaternion) < 1.1:
+                parent, child = each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/")
+                self._parents[child] = parent, Rotation.from_quat(quaternion), position
 
     def pose(self, frame: str, base: str) -> StaticPose | None:
         """Pose of a frame in a base, of which it is a descendant; None where the tree does not have it."""

@@ -13,6 +13,7 @@ import shutil
 import sqlite3
 import struct
 import tempfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +25,8 @@ from ibvs_qp.config.files import UnreadableFile, open_regular
 LARGEST_DATA = 1 << 39
 #: Largest chunk and message after decompression [bytes]: four pictures of `interfaces.ros.messages.MOST_ENTRIES`.
 LARGEST_UNPACKED = 1 << 28
+#: Largest definition of a type or channel, and most data of chunks that overlap in time [bytes].
+LARGEST_DEFINITION, LARGEST_HELD = 1 << 22, 1 << 30
 #: First bytes of the formats.
 MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC = b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -57,6 +60,7 @@ class McapStorage:
         channels: Its channels.
         stated: Messages of each topic that the file itself states; empty without statistics.
         damage: Where and how it ends before its end; empty if it is whole.
+        damages: Damaged chunks by their place; complete after `messages`.
 
     Args:
         file: The file.
@@ -72,8 +76,12 @@ class McapStorage:
         self._channels: dict[int, Channel] = {}
         #: Start and end of recording, place and size of every part that holds messages.
         self._parts: list[tuple[int, int, int, int, int]] = []
-        self.profile, self.stated, self.damage = "", Counter[str](), ""
-        self._scan()
+        self.profile, self.stated, self.damage, self.damages = "", Counter[str](), "", dict[int, str]()
+        try:
+            self._scan()
+        except BaseException:
+            self.close()
+            raise
         self.channels = list(self._channels.values())
 
     def close(self) -> None:
@@ -82,16 +90,22 @@ class McapStorage:
 
     def messages(self, topics: set[str]) -> Iterator[Recorded]:
         """Messages of some topics by the time of their recording; equal times in the order of the file."""
-        waiting: list[tuple[int, int, Recorded]] = []
+        waiting: list[tuple[int, int, int, Recorded]] = []
+        held = 0
         for start, _, place, size, opcode in sorted(self._parts):
             while waiting and waiting[0][0] < start:
-                yield heapq.heappop(waiting)[2]
+                message = heapq.heappop(waiting)[3]
+                held -= len(message.data)
+                yield message
             for number, (channel_id, time_ns, data) in enumerate(self._messages(place, size, opcode)):
-                channel = self._channels[channel_id]
-                if channel.topic in topics:
-                    heapq.heappush(waiting, (time_ns, place + number, Recorded(time_ns, channel, data)))
+                channel = self._channels.get(channel_id)
+                if channel is not None and channel.topic in topics:
+                    heapq.heappush(waiting, (time_ns, place, number, Recorded(time_ns, channel, data)))
+                    held += len(data)
+            if held > LARGEST_HELD:
+                raise ValueError(f"its chunks overlap in time by more than {LARGEST_HELD} bytes")
         while waiting:
-            yield heapq.heappop(waiting)[2]
+            yield heapq.heappop(waiting)[3]
 
     def _scan(self) -> None:
         """Find parts, schemas, channels and statistics by the heads of the records alone."""
@@ -106,10 +120,13 @@ class McapStorage:
             if place > end:
                 self.damage = f"it ends within a record, at byte {end}"
                 break
+            if opcode == 0:  # reserved room that a killed recorder did not fill
+                self.damage = f"it has no records from byte {start - _HEAD.size} on"
+                break
             if opcode in (_CHUNK, _MESSAGE):
                 times = self._stream.read(16) if opcode == _CHUNK else self._stream.read(14)[6:] * 2
                 self._parts.append((*_TIMES.unpack(times), start, size, opcode))
-            elif opcode in (_HEADER, _SCHEMA, _CHANNEL, _STATISTICS):
+            elif opcode in (_HEADER, _SCHEMA, _CHANNEL, _STATISTICS) and size <= LARGEST_DEFINITION:
                 self._define(opcode, self._stream.read(size), counts)
         else:
             self.damage = self.damage or "it has no end, as of a recorder that was killed"
@@ -123,11 +140,17 @@ class McapStorage:
 
     def _messages(self, place: int, size: int, opcode: int) -> list[tuple[int, int, bytes]]:
         """Messages of a part: channel, time [ns], data. Its schemas and channels are taken as well."""
+        if size > LARGEST_UNPACKED:
+            raise ValueError(f"a part has {size} bytes, at most {LARGEST_UNPACKED} are read")
         self._stream.seek(place)
         data = self._stream.read(size)
         if opcode == _MESSAGE:
             return [_message(data)]
-        content, found, place = _chunk(data), [], 0
+        content, whole = _chunk(data)
+        if not whole:
+            self.damages[place] = f"the chunk at byte {place} is damaged and left out"
+            return []
+        found, place = [], 0
         while place + _HEAD.size <= len(content):
             opcode, size = _HEAD.unpack_from(content, place)
             place += _HEAD.size
@@ -167,17 +190,21 @@ class SqliteStorage:
 
     def __init__(self, file: Path) -> None:
         open_regular(file, LARGEST_DATA).close()
-        self.stated, self.damage = Counter[str](), ""
-        self._close = contextlib.ExitStack()
+        self.stated, self.damage, self.damages = Counter[str](), "", dict[int, str]()
+        with contextlib.ExitStack() as stack:
+            self._open(file, stack)
+            self._close = stack.pop_all()
+
+    def _open(self, file: Path, stack: contextlib.ExitStack) -> None:
         log = file.with_name(f"{file.name}-wal")
         if log.is_file() and log.stat().st_size:
-            folder = Path(self._close.enter_context(tempfile.TemporaryDirectory()))
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
             for each in (file, log):
                 shutil.copyfile(each, folder / each.name)
             address = f"{(folder / file.name).as_uri()}?mode=ro"
         else:
             address = f"{file.resolve().as_uri()}?immutable=1"
-        self._base = self._close.enter_context(contextlib.closing(sqlite3.connect(address, uri=True)))
+        self._base = stack.enter_context(contextlib.closing(sqlite3.connect(address, uri=True)))
         self._channels = {key: self._channel(name, kind) for key, name, kind in self._topics()}
         self.channels = list(self._channels.values())
 
@@ -191,7 +218,9 @@ class SqliteStorage:
         places = ", ".join("?" * len(chosen))
         text = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({places}) ORDER BY timestamp, id"  # nosec
         for key, time_ns, data in self._base.execute(text, chosen):
-            yield Recorded(int(time_ns), self._channels[key], bytes(data))
+            if not isinstance(data, bytes):
+                raise ValueError("a message is no blob")
+            yield Recorded(int(time_ns), self._channels[key], data)
 
     def _topics(self) -> list[Any]:
         return self._base.execute("SELECT id, name, type FROM topics").fetchall()
@@ -235,8 +264,8 @@ def _message(record: bytes) -> tuple[int, int, bytes]:
     return channel_id, time_ns, record[22:]
 
 
-def _chunk(record: bytes) -> bytes:
-    """Content of a chunk."""
+def _chunk(record: bytes) -> tuple[bytes, bool]:
+    """Content of a chunk, and whether it has its checksum."""
     from mcap import records
     from mcap.data_stream import ReadDataStream
 
@@ -244,7 +273,8 @@ def _chunk(record: bytes) -> bytes:
     unpack = {"": lambda data, _: data, "zstd": _zstd, "lz4": _lz4}.get(chunk.compression)
     if unpack is None:
         raise ValueError(f"compression {chunk.compression[:20]!r} is unknown")
-    return unpack(chunk.data, chunk.uncompressed_size)
+    content = unpack(chunk.data, chunk.uncompressed_size)
+    return content, chunk.uncompressed_crc in (0, zlib.crc32(content))
 
 
 def _zstd(data: bytes, size: int) -> bytes:

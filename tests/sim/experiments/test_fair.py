@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 import pytest
@@ -10,11 +12,14 @@ from sim.experiments import FAIR
 from sim.experiments.comparison import Comparison, Outcome, grouped, opponent_name
 from sim.experiments.comparison import comparisons as of_experiment
 from sim.experiments.design import Choice, design
-from sim.experiments.fair.__main__ import page
+from sim.experiments.fair.__main__ import page, put_into
 from sim.experiments.page import QP, Fields
 from sim.experiments.spec import experiment
 from sim.rivals import MPC
 from sim.sweep.mixed import CROSSED, law_and_gains
+from sim.sweep.tables import read_tables
+
+ROOT = Path(__file__).parents[3]
 
 CELLS = (("paint", "datasheet", 0.1), ("slide at the reach", "ideal", 12.6))
 LAWS = (*CROSSED, ("paper", "box"), ("qp", "mpc"))
@@ -105,3 +110,10 @@ def test_every_cell_crosses_laws_and_gains_with_the_same_seeds():
     for flown in cells.values():
         assert set(CROSSED) | {("paper", "box"), ("qp", "mpc")} <= set(flown)
         assert all(seeds == list(range(10)) for seeds in flown.values())
+
+
+def test_the_shipped_page_and_readme_have_the_numbers_of_the_shipped_table() -> None:
+    record = read_tables([ROOT / "docs" / "experiments" / "fair.parquet"])
+    assert (ROOT / "docs" / "experiments" / "results.md").read_text(encoding="utf-8") == page(record)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert put_into(readme, record) == readme

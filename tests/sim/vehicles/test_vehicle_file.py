@@ -173,3 +173,21 @@ def test_the_command_writes_all_formats(tmp_path: Path, capsys: pytest.CaptureFi
     assert capsys.readouterr().out.count("Written: ") == 3
     kinds = {kind: read_vehicle(tmp_path / kind).kind for kind in ("mjcf", "px4", "toml")}
     assert kinds == {"mjcf": "MJCF", "px4": "PX4 parameters", "toml": "TOML"}
+
+
+def test_the_principal_point_of_the_file_is_mujocos() -> None:
+    """By the frustum of MuJoCo's renderer, in which columns go to the right and rows down."""
+    width, height = T960.camera_size_px
+    fx, fy, cx, cy = 600.0, 600.0, 0.5 * (width - 1) + 40.0, 0.5 * (height - 1) + 20.0
+    model = mujoco.MjModel.from_xml_string(
+        vehicle_mjcf(dataclasses.replace(T960, camera_intrinsics_px=(fx, fy, cx, cy)))
+    )
+    data, scene, camera = mujoco.MjData(model), mujoco.MjvScene(model, 100), mujoco.MjvCamera()
+    mujoco.mj_forward(model, data)
+    camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, 0
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    seen = scene.camera[0]
+    scale = fy / seen.frustum_near
+    left = scale * (seen.frustum_center - seen.frustum_width)
+    assert left == pytest.approx(-(cx + 0.5), abs=0.1)  # the border of the first pixel, left of the axis
+    assert scale * seen.frustum_top == pytest.approx(cy + 0.5, abs=0.1)

@@ -11,11 +11,14 @@ import pytest
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
+from ibvs_qp.interfaces.ros import compressed as compressed_module
 from ibvs_qp.interfaces.ros import pictures
-from ibvs_qp.interfaces.ros.latest_samples import CLOCK_SET_NS, WAITING_NS, LatestSamples
+from ibvs_qp.interfaces.ros.latest_samples import CLOCK_SET_NS, MOST_WAITING, WAITING_NS, LatestSamples
 from ibvs_qp.interfaces.ros.messages import COMPRESSED_IMAGE, BadMessage, header, message
+from ibvs_qp.interfaces.ros.samples import to_imu
 from ibvs_qp.interfaces.ros.topics import Topics
 
+REST = np.array([0.0, 0.0, -9.81])
 #: Two halves of colours that JPEG and half colour keep.
 RGB = np.zeros((48, 64, 3), np.uint8)
 RGB[:, :32], RGB[:, 32:] = (200, 60, 20), (20, 90, 180)
@@ -145,3 +148,38 @@ def test_a_repeated_pair_and_one_that_no_frame_takes_are_counted_and_a_clock_tha
         "depth: not newer than the last pair": 1,
         "color: a newer picture came before a frame": 2,
     }
+
+
+def test_a_clock_that_steps_back_blinds_no_bridge_and_late_samples_stay_out() -> None:
+    now = [10 * CLOCK_SET_NS]
+    held = LatestSamples(Topics(), clock=lambda: now[0])
+    imu = [
+        to_imu(10 * CLOCK_SET_NS - ms * 1_000_000, np.array([1.0, 0, 0, 0]), np.zeros(3), REST) for ms in (5, 9, 800)
+    ]
+    assert held.add("imu", imu[0]) and not held.add("imu", imu[1])
+    now[0] -= 790_000_000  # set back by less than a second
+    assert held.add("imu", imu[2])
+    held.add("camera_info", pictures.from_intrinsics((70, 70, 32, 24), (48, 64), 1))
+    for step in (0, 500_000_000):
+        now[0] -= step
+        assert held.add("color", pictures.from_rgb(RGB, now[0])) and held.add(
+            "depth", pictures.from_depth(DEPTH, now[0])
+        )
+    assert held.pairs == 2
+
+
+def test_pictures_with_frozen_stamps_do_not_fill_the_memory() -> None:
+    held = LatestSamples(Topics())
+    for _ in range(100):
+        held.add("color", pictures.from_rgb(RGB, 0))
+    assert len(held._waiting["color"]) <= MOST_WAITING
+    assert held.ignored["color: no depth within pair_s"] == 100 - MOST_WAITING
+
+
+def test_a_jpeg_cannot_hide_its_size_behind_a_marker_without_a_segment() -> None:
+    large = packed(".jpg", np.zeros((600, 600, 3), np.uint8))
+    fake = struct.pack(">BBHBHHB", 0xFF, 0xC0, 17, 8, 16, 16, 3) + bytes(9)
+    for marker in (b"\xff\x01", b"\xff\xd0", b"\xff\xff"):
+        hidden = large[:2] + marker + struct.pack(">H", len(fake) + 2) + fake + large[2:]
+        with pytest.raises(BadMessage):
+            compressed_module.colour(compressed("jpeg", hidden), 512)

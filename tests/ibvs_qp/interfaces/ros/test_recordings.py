@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -377,3 +378,58 @@ def test_poses_of_tf_static_are_those_of_the_vehicle_or_named() -> None:
     circle = [transform("a", "b", (0.0,) * 3, optical), transform("b", "a", (0.0,) * 3, optical)]
     loop = StaticPoses([message(TF, transforms=circle)])
     assert loop.pose("a", "base_link") is None
+
+
+def test_a_damaged_chunk_is_left_out_and_named(tmp_path: Path) -> None:
+    path = rest(tmp_path / "one.mcap", chunk_size=1000)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+    count, _, differences = frames(path)
+    assert 0.8 * COUNT < count < COUNT
+    assert any("is damaged and left out" in each for each in differences)
+    assert any(each.startswith("/imu/data: the file states 100 messages") for each in differences)
+
+
+def test_counts_are_compared_file_by_file(tmp_path: Path) -> None:
+    """A killed recorder's second file states nothing; the first is whole."""
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    rest(folder / "bag_0.mcap", count=50)
+    second = rest(folder / "bag_1.mcap", first=50, count=50, chunk_size=500)
+    second.write_bytes(second.read_bytes()[: second.stat().st_size // 2])
+    _, _, differences = frames(folder)
+    assert len(differences) == 1 and differences[0].startswith("bag_1.mcap: it ends within a record")
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        "rosbag2_bagfile_information: {topics_with_message_count:"
+        " [{topic_metadata: {name: /imu/data}, message_count: .inf}]}",
+        "a: &a [x,x,x,x,x,x,x,x,x,x]\n"
+        + "".join(f"{b}: &{b} [{','.join(['*' + a] * 10)}]\n" for a, b in zip("abcdefg", "bcdefgh", strict=True))
+        + "rosbag2_bagfile_information: {relative_file_paths: [*h], topics_with_message_count:"
+        " [{topic_metadata: {name: *h}, message_count: 1}]}",
+    ],
+    ids=["infinite", "aliases"],
+)
+def test_hostile_metadata_cost_neither_time_nor_messages(tmp_path: Path, metadata: str) -> None:
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    rest(folder / "bag_0.mcap")
+    (folder / "metadata.yaml").write_text(metadata)
+    began = time.process_time()
+    assert frames(folder)[0] == COUNT
+    assert time.process_time() - began < 10.0
+
+
+def test_a_record_of_a_terabyte_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = rest(tmp_path / "one.mcap", count=2, use_chunking=False)
+    content = path.read_bytes()
+    at = content.index(b"\x05", 60)
+    with open(path, "wb") as stream:
+        stream.write(content[:at] + b"\x05" + (1 << 33).to_bytes(8, "little") + bytes(22))
+        stream.truncate(1 << 34)
+    with pytest.raises(ConfigError):
+        list(Bag(path).sensor_frames())
