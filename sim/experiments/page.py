@@ -94,12 +94,14 @@ class Fields:
     def median(self, metric: str, law: str, variant: str = "standard", **params: Any) -> str:
         """Median of a figure over the flights that ended as planned, with its unit."""
         figure, rows = figure_of(metric), self._rows(law, variant, params).filter(pl.col("completed"))
-        values = rows[metric].drop_nulls().to_numpy()
+        values = rows[metric].drop_nulls().to_numpy() if metric in rows.columns else ()
         return f"{figure.scale * np.median(values):.3g} {figure.unit}".rstrip() if len(values) else "–"
 
     def gap(self, metric: str, law: str, variant: str = "standard", **params: Any) -> str:
         """Figure of an opponent minus that of the QP, paired, with its exact interval."""
         figure = figure_of(metric)
+        if metric not in self.table.columns:
+            return "–"
         both = self._rows(*QP, params).join(self._rows(law, variant, params), on="seed", suffix=".second")
         both = both.filter(pl.col("completed") & pl.col("completed.second"))
         values = figure.scale * (both[f"{metric}.second"] - both[metric]).drop_nulls().to_numpy()
