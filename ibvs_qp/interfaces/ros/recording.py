@@ -115,6 +115,8 @@ class Recording:
             yield
         except Exception as error:
             self.close()
+            if isinstance(error, UnreadableFile):
+                raise ConfigError(str(error)) from None
             reason = str(getattr(error, "reason", "")) or f"{type(error).__name__}: {error}"
             text = f"{self._path} is no readable ROS 2 bag ({shown(' '.join(reason.split()))[1:-1]})"
             raise ConfigError(text) from None
