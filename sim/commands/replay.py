@@ -47,6 +47,7 @@ class ReplayCommand:
 
     def run(self, words: list[str]) -> int:
         """Replay and print."""
+        import ibvs_qp.interfaces.log  # noqa: F401  # names the extra where it is missing: both kinds need it
         from ibvs_qp.interfaces.ros.recording import is_bag
 
         return self._bag() if is_bag(self.log) else self._log()

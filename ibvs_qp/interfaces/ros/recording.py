@@ -115,7 +115,7 @@ class Recording:
             yield
         except Exception as error:
             self.close()
-            if isinstance(error, UnreadableFile):
+            if isinstance(error, UnreadableFile) and not self._path.exists():
                 raise ConfigError(str(error)) from None
             reason = str(getattr(error, "reason", "")) or f"{type(error).__name__}: {error}"
             text = f"{self._path} is no readable ROS 2 bag ({shown(' '.join(reason.split()))[1:-1]})"
