@@ -170,11 +170,11 @@ class StandIn:
         self._clock, self._camera = clock or time.time_ns, None
         self._pose = multiprocessing.Array("d", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         camera = Camera(self.vehicle.wall, self.vehicle.vehicle.camera_position_m)
-        part, topics = Participant(plan.domain), Px4Topics()
-        if clock is None:
+        if clock is None:  # before DDS starts here: its threads do not survive a fork
             arguments = plan.domain, plan.picture_hz, camera, self._pose
             multiprocessing.Process(target=run_camera, args=arguments, daemon=True).start()
-        else:
+        part, topics = Participant(plan.domain), Px4Topics()
+        if clock is not None:
             self._camera = CameraTopics(part, camera)
         self._imu = part.writer(topics.imu, SENSOR_COMBINED)
         self._attitude = part.writer(topics.attitude, VEHICLE_ATTITUDE)
