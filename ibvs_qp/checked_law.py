@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Self
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.turned_camera import TurnedCamera
-from ibvs_qp.flight_state import FlightState, copied, put_state, take_state
+from ibvs_qp.flight_state import FlightState, Rebuilt, put_state, take_state
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
 from ibvs_qp.model.setpoints import Setpoints
@@ -35,7 +34,7 @@ class Inputs(NamedTuple):
     rejected: tuple[str, ...]  # refused inputs, with the reason
 
 
-class CheckedLaw(ABC):
+class CheckedLaw(Rebuilt, ABC):
     """Checks its inputs and never raises; a subclass is the law.
 
     Attributes:
@@ -45,13 +44,6 @@ class CheckedLaw(ABC):
     """
 
     setpoints: Setpoints
-    _make: Callable[[], Any]
-
-    def __new__(cls, *arguments: Any, **named: Any) -> Self:
-        """Keep the arguments of the class, also of a subclass with its own, for copies."""
-        made = super().__new__(cls)
-        made._make = functools.partial(cls, *arguments, **named)
-        return made
 
     def __init__(self, config: ControllerConfig) -> None:
         self.config = self.initial_config = config
@@ -80,10 +72,6 @@ class CheckedLaw(ABC):
             ConfigError: When it is of another class, configuration, tasks or limits.
         """
         put_state(self, self.initial_config, state)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are built anew from the same arguments, and continue from the state."""
-        return copied, (self._make, self.state())
 
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(

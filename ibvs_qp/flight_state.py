@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from ibvs_qp.config.errors import ConfigError
 
@@ -74,6 +75,29 @@ def put_state(root: Any, config: Any, state: FlightState) -> None:
             part.load_memory(values)
         else:
             vars(part).update(values)
+
+
+class Rebuilt:
+    """An object with `state` and `restore` whose copies and pickles are built anew from its constructor's arguments.
+
+    The arguments are those of the outermost class, so a subclass with its own constructor is copied as well.
+    """
+
+    _make: Callable[[], Any]
+
+    def __new__(cls, *arguments: Any, **named: Any) -> Self:
+        """Keep the arguments."""
+        made = super().__new__(cls)
+        made._make = functools.partial(cls, *arguments, **named)
+        return made
+
+    def state(self) -> FlightState:
+        """Everything that changes from step to step."""
+        raise NotImplementedError
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Built from the same arguments, in the present state."""
+        return copied, (self._make, self.state())
 
 
 def copied(make: Callable[[], Any], state: FlightState) -> Any:

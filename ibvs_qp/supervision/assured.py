@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
@@ -13,7 +12,7 @@ from ibvs_qp.checked_law import CheckedLaw, Inputs
 from ibvs_qp.command import Command
 from ibvs_qp.config import LONGEST_TICK, SafetySettings
 from ibvs_qp.estimation.contact_state import ContactState
-from ibvs_qp.flight_state import FlightState, copied, put_state, take_state
+from ibvs_qp.flight_state import FlightState, Rebuilt, put_state, take_state
 from ibvs_qp.frames import dot, down_in_body
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import hover_command
@@ -28,7 +27,7 @@ _ATTITUDE = {"attitude", "angular_velocity"}
 _INERTIAL = _ATTITUDE | {"specific_force"}
 
 
-class Assured:
+class Assured(Rebuilt):
     """Monitors and supervisor around a controller, with the same `step`; one line to add to a loop.
 
     ``controller = Assured(HybridController(config))``
@@ -45,10 +44,7 @@ class Assured:
         settings: Bounds of the monitors and motions of the states.
     """
 
-    CONSTANTS = ("_settings",)
-
     def __init__(self, controller: CheckedLaw, settings: SafetySettings | None = None) -> None:
-        self._settings = settings
         self.controller, self.supervision = controller, Supervision(controller.config, settings)
         self.reset()
 
@@ -58,9 +54,6 @@ class Assured:
         self.supervision.reset()
         self._attitude_ns = self._plane_ns = self._lines_ns = self._time_ns = -1
         self._dt = self._descended_m = 0.0
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return copied, (functools.partial(type(self), self.controller, self._settings), self.state())
 
     def state(self) -> FlightState:
         """Everything that changes from step to step, as `CheckedLaw.state`."""

@@ -13,9 +13,9 @@ from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY, R_BODY_CAMERA
 from ibvs_qp.pilot.vehicle_check import vehicle_actuation
 from sim.world.drawn_shape import tool_xml, vehicle_xml
-from sim.world.mjcf import numbers
-from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, rotor_quaternion
-from sim.world.rigid_body import RigidBody, bare_body, principal_axes, tool_body
+from sim.world.mjcf import inertial_xml, numbers, rotors_xml
+from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
+from sim.world.rigid_body import RigidBody, bare_body, tool_body
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, turn_quaternion
 
@@ -47,10 +47,10 @@ def vehicle_mjcf(vehicle: VehicleParams) -> str:
     sensor = numbers(FLIP * vehicle.force_torque_position_m)
     turn = numbers(FLIP_QUATERNION * turn_quaternion(vehicle.force_torque_turn_deg))
     try:
-        bare, tool = _inertial(bare_body(true)), _inertial(tool_body(vehicle))
+        bare, tool = inertial_xml(bare_body(true)), inertial_xml(tool_body(vehicle), LEAST_MOMENT)
     except ConfigError:
-        bare, tool = _inertial(RigidBody(vehicle.mass_kg, np.zeros(3), vehicle.inertia)), ""
-    sites, actuators = _rotors(vehicle)
+        bare, tool = inertial_xml(RigidBody(vehicle.mass_kg, np.zeros(3), vehicle.inertia)), ""
+    sites, actuators = rotors_xml(vehicle, vehicle.motor_lag_s, limited=True)
     custom = "".join(
         f'<numeric name="vehicle.{name}" data="{numbers(np.asarray(getattr(vehicle, name)))}"/>' for name in CUSTOM
     )
@@ -90,32 +90,6 @@ def vehicle_mjcf(vehicle: VehicleParams) -> str:
 
 def _fields(vehicle: VehicleParams) -> dict[str, Any]:
     return {field.name: getattr(vehicle, field.name) for field in dataclasses.fields(VehicleParams)}
-
-
-def _inertial(body: RigidBody) -> str:
-    """Mass, centre and inertia by principal axes, front-left-up; a rod has a least moment about itself."""
-    moments, quaternion = principal_axes(body)
-    return (
-        f'<inertial mass="{numbers(body.mass)}" pos="{numbers(FLIP * body.centre)}" quat="{numbers(quaternion)}" '
-        f'diaginertia="{numbers(np.maximum(moments, LEAST_MOMENT))}"/>'
-    )
-
-
-def _rotors(vehicle: VehicleParams) -> tuple[str, str]:
-    """Sites, z along the thrust, and actuators: force along z, drag torque against the spin."""
-    geometry, sites, actuators = vehicle.geometry, [], []
-    rows = zip(
-        geometry.names, geometry.positions, geometry.axes, -geometry.spins * geometry.torque_ratios,
-        vehicle.thrust_min, vehicle.thrust_max, strict=True,
-    )  # fmt: skip
-    for name, position, axis, torque, low, high in rows:
-        place = f'pos="{numbers(FLIP * position)}" quat="{numbers(rotor_quaternion(axis))}"'
-        sites.append(f'<site name="{name}" {place} size="0.01"/>')
-        actuators.append(
-            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(vehicle.motor_lag_s)}" '
-            f'ctrlrange="{numbers(low, high)}" gear="0 0 1 0 0 {numbers(torque)}"/>'
-        )
-    return "\n".join(sites), "\n".join(actuators)
 
 
 def _camera(vehicle: VehicleParams) -> str:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
 from sim.world.drawn_shape import tool_xml, vehicle_xml
@@ -51,25 +52,34 @@ def numbers(*values: float | np.ndarray) -> str:
     return " ".join(f"{float(entry):.17g}" for value in values for entry in np.atleast_1d(value))
 
 
-def _inertial_xml(body: RigidBody) -> str:
+def inertial_xml(body: RigidBody, least: float = 1e-9) -> str:
+    """Mass, centre and inertia of a body by principal axes, front-left-up; a rod has a least moment [kg m^2]."""
     moments, quaternion = principal_axes(body)
     return (
         f'<inertial mass="{numbers(body.mass)}" pos="{numbers(FLIP * body.centre)}" quat="{numbers(quaternion)}" '
-        f'diaginertia="{numbers(np.maximum(moments, 1e-9))}"/>'
+        f'diaginertia="{numbers(np.maximum(moments, least))}"/>'
     )
 
 
-def _rotors_xml(vehicle: TrueVehicle) -> tuple[str, str]:
-    """Rotor sites (z = thrust axis), and their actuators: force along z, drag torque against the spin."""
-    geometry = vehicle.geometry
+def rotors_xml(vehicle: VehicleParams, lag_s: float, *, limited: bool = False) -> tuple[str, str]:
+    """Rotor sites (z = thrust axis), and their actuators: force along z, drag torque against the spin.
+
+    Args:
+        vehicle: The vehicle.
+        lag_s: First-order lag of every rotor [s].
+        limited: Whether the actuators have the thrust limits.
+    """
+    geometry, limits = vehicle.geometry, np.column_stack((vehicle.thrust_min, vehicle.thrust_max))
     sites, actuators = [], []
     torques = -geometry.spins * geometry.torque_ratios
-    for name, position, axis, torque in zip(geometry.names, geometry.positions, geometry.axes, torques, strict=True):
+    rows = zip(geometry.names, geometry.positions, geometry.axes, torques, limits, strict=True)
+    for name, position, axis, torque, limit in rows:
+        control = f' ctrlrange="{numbers(limit)}"' if limited else ""
         frame = f'pos="{numbers(FLIP * position)}" quat="{numbers(rotor_quaternion(axis))}"'
         sites.append(f'<site name="{name}" {frame} size="0.01"/>')
         actuators.append(
-            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(vehicle.motor_lag_up_s)}" '
-            f'gainprm="1" gear="0 0 1 0 0 {numbers(torque)}"/>'
+            f'<general name="{name}" site="{name}" dyntype="filterexact" dynprm="{numbers(lag_s)}" '
+            f'gainprm="1"{control} gear="0 0 1 0 0 {numbers(torque)}"/>'
         )
     return "\n".join(sites), "\n".join(actuators)
 
@@ -95,7 +105,7 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
 
     The contact plane is infinite; `sim.world.face` moves it to the surface before the tip.
     """
-    sites, actuators = _rotors_xml(vehicle)
+    sites, actuators = rotors_xml(vehicle, vehicle.motor_lag_up_s)
     tip, sensor = FLIP * vehicle.tip_position_m, FLIP * vehicle.force_torque_position_m
     sphere = tip - np.array([TIP_RADIUS_M, 0.0, 0.0])
     turn = FLIP_QUATERNION * turn_quaternion(vehicle.force_torque_turn_deg)
@@ -112,12 +122,12 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
     {surroundings}
     <body name="vehicle">
       <freejoint/>
-      {_inertial_xml(bare_body(vehicle))}
+      {inertial_xml(bare_body(vehicle))}
       <site name="imu"/>
       {sites}
       {body}
       <body name="tool">
-        {_inertial_xml(tool_body(vehicle))}
+        {inertial_xml(tool_body(vehicle))}
         <site name="force_torque" pos="{numbers(sensor)}" quat="{numbers(turn)}"/>
         {tool}
         <geom name="tip" type="sphere" pos="{numbers(sphere)}" size="{numbers(TIP_RADIUS_M)}" contype="0"

@@ -79,6 +79,9 @@ class BridgeConfig:
         validate(self)
         if self.namespace:
             check_name("namespace", self.namespace)
+        if self.topics.attitude_filter_s > 0.0:
+            words = "it must be 0 in flight: PX4 has an attitude, and the self-check compares it with the accelerometer"
+            raise out_of_range("topics.attitude_filter_s", self.topics.attitude_filter_s, "s", words)
 
     @classmethod
     def from_toml(cls, file: str | Path) -> BridgeConfig:

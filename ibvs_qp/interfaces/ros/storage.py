@@ -70,7 +70,6 @@ class McapStorage:
     """
 
     def __init__(self, file: Path) -> None:
-        self._file = file
         self._stream: BinaryIO = open_regular(file, LARGEST_DATA)
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._channels: dict[int, Channel] = {}

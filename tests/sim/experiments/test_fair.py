@@ -90,7 +90,7 @@ def test_the_page_has_every_number_from_the_table():
     assert f"{table.height} flights" in text and "{{" not in text
     assert "| analytic law, box | 3 |" in text  # the paths of both cells, and the slide
     assert (
-        "| paint, world datasheet" in text
+        "| paint 0.1, datasheet |" in text
         and "| 10 of 10 |" in text
         and "held 10 of 10" in text
         and "held 0 of 10" in text

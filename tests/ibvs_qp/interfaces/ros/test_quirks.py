@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
-from mcap.exceptions import McapError
+from bag_files import LEVEL, REST, TICK
 from mcap.reader import NonSeekingReader
 from mcap.writer import CompressionType, IndexType, Writer
 from ruamel.yaml import YAML
@@ -35,9 +35,8 @@ from ibvs_qp.interfaces.ros.messages import (
 
 IMU_TOPIC, WRENCH_TOPIC, OTHER = "/imu/data", "/ft_sensor/wrench", "/rosout"
 TYPES = {IMU_TOPIC: IMU, WRENCH_TOPIC: WRENCH, OTHER: "their_msgs/msg/Thing"}
-TICK, LEVEL = 4_000_000, np.array([1.0, 0.0, 0.0, 0.0])
 ENCODED = {
-    IMU_TOPIC: lambda stamp: encoded(samples.to_imu(stamp, LEVEL, np.zeros(3), np.array([0.0, 0.0, -9.81])), IMU),
+    IMU_TOPIC: lambda stamp: encoded(samples.to_imu(stamp, LEVEL, np.zeros(3), REST), IMU),
     WRENCH_TOPIC: lambda stamp: encoded(samples.to_wrench(stamp, np.zeros(6), "flu", "tool"), WRENCH),
     OTHER: lambda stamp: b"\0\1\0\0" + stamp.to_bytes(8, "little"),
 }
@@ -127,8 +126,8 @@ def counted(file: Path) -> Counter[str]:
         try:
             for _, channel, _ in NonSeekingReader(stream).iter_messages(log_time_order=False):
                 counts[channel.topic] += 1
-        except (McapError, EOFError, ValueError, Exception):
-            pass
+        except Exception:  # the end of a cut file: the library has several
+            return counts
     return counts
 
 
