@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
-import importlib
 import sys
 from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -57,30 +54,6 @@ def _block(self, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
-class Settings(SphinxDirective):
-    """Table of a settings class: key, default, unit, range and meaning, as its fields declare them."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        """Section with the table, from Markdown."""
-        module, _, name = self.arguments[0].rpartition(".")
-        kind = getattr(importlib.import_module(module), name)
-        rows = [f"## {name}\n", "| key | default | range | meaning |", "|---|---|---|---|"]
-        for field in dataclasses.fields(kind):
-            if meta := field.metadata:
-                allowed = ", ".join(meta["options"]) if "options" in meta else _range(field.default, meta)
-                words = meta["doc"] + (f" ({meta['why']})" if meta.get("why") else "")
-                default = f"{field.default!r} {meta['unit']}".rstrip().replace("|", "/")
-                rows.append(f"| `{field.name}` | `{default}` | {allowed} | {words.replace('|', '/')} |")
-        return self.parse_text_to_nodes("\n".join(rows), allow_section_headings=True)
-
-
-def _range(default: object, meta) -> str:
-    return "" if isinstance(default, (bool, str)) else f"{meta['low']:g} to {meta['high']:g}"
-
-
 def setup(app: Sphinx) -> None:
     """Write equations as MathML, which browsers draw themselves: no script, no network."""
     app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
-    app.add_directive("settings", Settings)
