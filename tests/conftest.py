@@ -1,15 +1,21 @@
-"""One thread per process for linear algebra, as on the command line, and one compilation of vision for all workers."""
+"""One thread per process for linear algebra, as on the command line, and one compilation for all workers."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # small matrices, and workers side by side
+
+if sys.dont_write_bytecode and "PYTHONPYCACHEPREFIX" not in os.environ:  # every child would compile all sources anew
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 _COMPILE = "import ibvs_qp.vision.perception; from ibvs_qp.vision.compilation import prepare; prepare()"
 
