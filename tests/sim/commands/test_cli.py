@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contract_schema import check_summary
-from made_up_flights import fake_fly
+from made_up_flights import draw_one_figure, fake_fly
 
 import ibvs_qp
 import sim.flight.side_by_side
@@ -37,6 +37,11 @@ def flown(monkeypatch, tmp_path):
     return tmp_path
 
 
+@pytest.fixture
+def one_figure(monkeypatch):
+    draw_one_figure(monkeypatch)
+
+
 def test_paint_writes_the_run_folder_and_prints_a_table(flown, capsys):
     assert main(["paint", "--out", "run"]) == 0
     out, _ = capsys.readouterr()
@@ -49,7 +54,7 @@ def test_paint_writes_the_run_folder_and_prints_a_table(flown, capsys):
     assert (flown / "run" / "video.mp4").stat().st_size > 10_000
 
 
-def test_json_is_one_line_and_equals_the_file(flown, capsys):
+def test_json_is_one_line_and_equals_the_file(flown, one_figure, capsys):
     assert main(["paint", "--json", "--no-video", "--seed", "3", "--image-size", "424x240"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -65,7 +70,7 @@ def test_json_is_one_line_and_equals_the_file(flown, capsys):
     assert summary["command"] in (run / "README.txt").read_text(), "with all options that change the flight"
 
 
-def test_log_reads_back_equal(flown, capsys):
+def test_log_reads_back_equal(flown, one_figure, capsys):
     assert main(["paint", "--law", "qp", "--out", "run", "--no-video"]) == 0
     trace = fake_fly(in_world(Scene(), DEFAULT_WORLD), FlightOptions())
     back = load_run(flown / "run")["qp"]
@@ -75,7 +80,7 @@ def test_log_reads_back_equal(flown, capsys):
     assert [event.text for event in back.events] == [event.text for event in trace.events]
 
 
-def test_second_run_leaves_nothing_stale(flown, capsys):
+def test_second_run_leaves_nothing_stale(flown, one_figure, capsys):
     assert main(["paint", "--out", "run", "--no-video"]) == 0
     (flown / "run" / "video.mp4").touch()
     (flown / "run" / "notes.txt").write_text("mine")
@@ -85,7 +90,7 @@ def test_second_run_leaves_nothing_stale(flown, capsys):
     assert not [file for file in (flown / "run").rglob("*") if file.name.startswith((".", "partial"))]
 
 
-def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch):
+def test_law_that_does_not_complete_is_still_reported(flown, one_figure, capsys, monkeypatch):
     def crash(scene, options, progress=None, job=None):
         return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="propeller touched the wall")
 
@@ -94,7 +99,7 @@ def test_law_that_does_not_complete_is_still_reported(flown, capsys, monkeypatch
     assert json.loads(capsys.readouterr().out)["laws"]["qp"]["reason"] == "propeller touched the wall"
 
 
-def test_interrupt_writes_the_partial_run(flown, capsys, monkeypatch):
+def test_interrupt_writes_the_partial_run(flown, one_figure, capsys, monkeypatch):
     def cut_short(scene, options, progress=None, job=None):
         return dataclasses.replace(fake_fly(scene, options), claimed=False, reason="interrupted")
 
@@ -177,8 +182,8 @@ def test_user_errors_are_one_line(flown, capsys, words, needles):
     assert sorted(flown.rglob("*")) == before, "a rejected command writes nothing"
 
 
-def test_shipped_files_have_names(flown):
-    assert main(["paint", "--scene", "dark_board", "--law", "qp", "--out", "run"]) == 0
+def test_shipped_files_have_names(flown, one_figure):
+    assert main(["paint", "--scene", "dark_board", "--law", "qp", "--no-video", "--out", "run"]) == 0
     assert "width_m = 1.35" in (flown / "run" / "scene.toml").read_text()
     assert preset_file(Path("octorotor_qp")) == FILES["octorotor_qp"]
     (flown / "octorotor_qp").write_text("law = 'qp'\n")
@@ -256,7 +261,7 @@ def test_a_study_without_its_packages_names_the_extra(tmp_path: Path, words: str
 
 def test_paint_needs_no_package_of_the_studies(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text("[paint]\nrows = 1\nstroke_m = 0.2\n")
-    words = "paint --scene short.toml --features geometric --no-video --out run".split()
+    words = "paint --law qp --scene short.toml --features geometric --no-video --out run".split()
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_STUDIES, *words], capture_output=True, text=True, timeout=300, cwd=tmp_path
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_flights import fake_fly
+from made_up_flights import draw_one_figure, fake_fly
 
 import sim.flight.side_by_side
 from ibvs_qp.config.errors import IbvsQpError
@@ -35,6 +35,7 @@ def flown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr(sim.flight.side_by_side, "fly", fake_fly)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     monkeypatch.chdir(tmp_path)
+    draw_one_figure(monkeypatch)
     return tmp_path
 
 
