@@ -61,12 +61,9 @@ def open_mcap(options: FlightOptions, world: World, pilot: Pilot) -> McapLog | N
 class ClosedLoop:
     """One flight, tick by tick: every tick is a `sense` and an `advance`; `fly` runs it to its end.
 
-    Between the two the next sensor frame is known and the vehicle has not moved yet.
-
     Attributes:
         pilot: The pilot.
         world: Plant, sensors, canvas and camera.
-        frame: Sensor frame of the last `sense`; None before the first.
         command: The pilot's last command; None before the first.
         ticks: Ticks flown.
         limit_s: Time-out [s].
@@ -97,7 +94,6 @@ class ClosedLoop:
         self._step = self.pilot.step if self._log is None else self._log.step
         strokes = BoardGeometry(scene).strokes
         self.limit_s = BASE_TIME + STROKE_FACTOR * self._job.expected_s(config.painting, strokes)
-        self.frame: SensorFrame | None = None
         self.command: Command | None = None
         self.ticks, self.reason = 0, ""
 
@@ -111,18 +107,18 @@ class ClosedLoop:
         """Whether a further tick belongs to the flight."""
         return not self.reason and (not self.pilot.painter.finished or self._schedule.watching)
 
-    def sense(self) -> None:
+    def sense(self) -> SensorFrame:
         """First half of a tick: faults that are due, and the sensor frame."""
         for text in self._schedule.tick(self.world, self.pilot):
             self._recorder.note(self.time_s, "fault", text)
             if self._log is not None:
                 self._log.note("fault", text)
-        self.frame = self.world.sense()
+        self._frame = self.world.sense()
+        return self._frame
 
     def advance(self) -> None:
         """Second half of a tick: the pilot's command, the motion under it, the log, and the end of the flight."""
-        assert self.frame is not None
-        frame, plant, command = self.frame, self.world.plant, self.command
+        frame, plant, command = self._frame, self.world.plant, self.command
         seen = self._schedule.seen(frame)
         if seen is not None or command is None:  # without a tick of the pilot its last command stays in force
             command = self.command = self._step(seen or frame)
