@@ -7,7 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ibvs_qp.command import Command
 from ibvs_qp.estimation.turned_camera import straightened
+from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot, PilotConfig
 from sim.faults.fault import Fault
 from sim.faults.schedule import FaultSchedule
@@ -16,7 +18,7 @@ from sim.flight.options import FlightOptions, pilot_config, ticks_in
 from sim.flight.own_law import own_law
 from sim.flight.recorder import Recorder
 from sim.flight.surroundings import World
-from sim.flight.trace import CRASH, INTERRUPTED, LANDED, Event, Trace
+from sim.flight.trace import CRASH, INTERRUPTED, LANDED, TIME_OUT, Event, Trace
 from sim.sensors.features import add_sigma_vs
 from sim.world.board import BoardGeometry
 from sim.world.random_streams import stream
@@ -56,6 +58,101 @@ def open_mcap(options: FlightOptions, world: World, pilot: Pilot) -> McapLog | N
     return McapLog(Path(options.journal) / f"{options.law}{MCAP}", world, pilot)
 
 
+class ClosedLoop:
+    """One flight, tick by tick: every tick is a `sense` and an `advance`; `fly` runs it to its end.
+
+    Attributes:
+        pilot: The pilot.
+        world: Plant, sensors, canvas and camera.
+        command: The pilot's last command; None before the first.
+        ticks: Ticks flown.
+        limit_s: Time-out [s].
+        reason: Why the flight ended before its strategy; empty without such an end.
+
+    Args:
+        scene: The truth.
+        options: Law, seed, features, picture size and so on.
+        config: Flown instead of the preset.
+        job: Task at the wall; None paints.
+        faults: Faults and their times.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        options: FlightOptions,
+        config: PilotConfig | None = None,
+        job: Job | None = None,
+        faults: tuple[Fault, ...] = (),
+    ) -> None:
+        config, self._job = pilot_config(scene, options, config), job or PaintJob()
+        self.pilot, self.world = make_pilot(scene, options, config, self._job), World(scene, options, config)
+        self._legs = tuple((float(right), float(down)) for right, down in self.pilot.painter.legs)
+        self._recorder = Recorder(scene, options, self.world, self.pilot)
+        self._schedule = FaultSchedule(faults, options.seed)
+        self._log = open_mcap(options, self.world, self.pilot)
+        self._step = self.pilot.step if self._log is None else self._log.step
+        strokes = BoardGeometry(scene).strokes
+        self.limit_s = BASE_TIME + STROKE_FACTOR * self._job.expected_s(config.painting, strokes)
+        self.command: Command | None = None
+        self.ticks, self.reason = 0, ""
+
+    @property
+    def time_s(self) -> float:
+        """Time flown [s]."""
+        return self.world.plant.time_ns * 1e-9
+
+    @property
+    def going(self) -> bool:
+        """Whether a further tick belongs to the flight."""
+        return not self.reason and (not self.pilot.painter.finished or self._schedule.watching)
+
+    def sense(self) -> SensorFrame:
+        """First half of a tick: faults that are due, and the sensor frame."""
+        for text in self._schedule.tick(self.world, self.pilot):
+            self._recorder.note(self.time_s, "fault", text)
+            if self._log is not None:
+                self._log.note("fault", text)
+        self._frame = self.world.sense()
+        return self._frame
+
+    def advance(self) -> None:
+        """Second half of a tick: the pilot's command, the motion under it, the log, and the end of the flight."""
+        frame, plant, command = self._frame, self.world.plant, self.command
+        seen = self._schedule.seen(frame)
+        if seen is not None or command is None:  # without a tick of the pilot its last command stays in force
+            command = self.command = self._step(seen or frame)
+        self.world.act(command.thrusts)
+        self._recorder.tick(frame, command)
+        if self._log is not None:
+            self._log.tick(frame.stamp_ns)
+        self.ticks += 1
+        if plant.crashed:
+            self.reason = f"{CRASH}: {plant.crashed}"
+        elif plant.landed:
+            self.reason = LANDED
+        elif self.time_s > self.limit_s:
+            self.reason = f"{TIME_OUT} after {self.limit_s:.0f} s of flight"
+
+    def close(self) -> None:
+        """Close window and MCAP log; the flight is over."""
+        self.world.close()
+        if self._log is not None and (problem := self._log.close()):
+            self._recorder.note(self.time_s, "log", problem)
+
+    def trace(self) -> Trace:
+        """The flight so far as a trace; called once, at its end."""
+        trace, painter, reason = self._recorder.trace(), self.pilot.painter, self.reason
+        planned = not reason or (reason == LANDED and painter.descending)
+        trace.claimed = planned and (painter.finished or bool(reason)) and not painter.failed
+        trace.reason, trace.plan = reason or painter.reason, self._job.plan
+        if isinstance(self._job, OwnJob):
+            trace.legs = self._legs
+        if reason:
+            trace.events.append(Event(t=self.time_s, kind="end", text=reason))
+        return trace
+
+
 def fly(
     scene: Scene,
     options: FlightOptions,
@@ -78,55 +175,19 @@ def fly(
         The trace; incomplete with a reason when the flight crashed, timed out or was interrupted, and when it landed
         although its strategy had not ended as planned.
     """
-    config, job = pilot_config(scene, options, config), job or PaintJob()
-    pilot, world = make_pilot(scene, options, config, job), World(scene, options, config)
-    legs = tuple((float(right), float(down)) for right, down in pilot.painter.legs)
-    recorder, schedule = Recorder(scene, options, world, pilot), FaultSchedule(faults, options.seed)
-    log = open_mcap(options, world, pilot)
-    fly_tick = pilot.step if log is None else log.step
-    limit = BASE_TIME + STROKE_FACTOR * job.expected_s(config.painting, BoardGeometry(scene).strokes)
-    start, reason, tick, shown = time.perf_counter(), "", 0, ticks_in(PROGRESS_S, config.controller.tick_s)
+    loop = ClosedLoop(scene, options, config, job, faults)
+    start, shown = time.perf_counter(), ticks_in(PROGRESS_S, loop.pilot.config.controller.tick_s)
     try:
-        command = None
-        while not pilot.painter.finished or schedule.watching:
-            for text in schedule.tick(world, pilot):
-                recorder.note(world.plant.time_ns * 1e-9, "fault", text)
-                if log is not None:
-                    log.note("fault", text)
-            frame = world.sense()
-            seen = schedule.seen(frame)
-            if seen is not None or command is None:  # without a tick of the pilot its last command stays in force
-                command = fly_tick(seen or frame)
-            world.act(command.thrusts)
-            recorder.tick(frame, command)
-            if log is not None:
-                log.tick(frame.stamp_ns)
-            tick += 1
-            if world.plant.crashed:
-                reason = f"{CRASH}: {world.plant.crashed}"
-                break
-            if world.plant.landed:
-                reason = LANDED
-                break
-            if world.plant.time_ns * 1e-9 > limit:
-                reason = f"time-out after {limit:.0f} s of flight"
-                break
-            if progress is not None and tick % shown == 0:
-                flown = world.plant.time_ns * 1e-9
-                progress(flown, pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
+        while loop.going:
+            loop.sense()
+            loop.advance()
+            if progress is not None and not loop.reason and loop.ticks % shown == 0:
+                flown = loop.time_s
+                progress(flown, loop.pilot.painter.phase, flown / max(time.perf_counter() - start, 1e-9))
     except KeyboardInterrupt:
-        reason = INTERRUPTED
+        loop.reason = INTERRUPTED
     finally:
-        world.close()
-        if log is not None and (problem := log.close()):
-            recorder.note(world.plant.time_ns * 1e-9, "log", problem)
-    trace = recorder.trace()
+        loop.close()
+    trace = loop.trace()
     trace.wall_time_s = time.perf_counter() - start  # includes the trace
-    planned = not reason or (reason == LANDED and pilot.painter.descending)
-    trace.claimed = planned and (pilot.painter.finished or bool(reason)) and not pilot.painter.failed
-    trace.reason, trace.plan = reason or pilot.painter.reason, job.plan
-    if isinstance(job, OwnJob):
-        trace.legs = legs
-    if reason:
-        trace.events.append(Event(t=world.plant.time_ns * 1e-9, kind="end", text=reason))
     return trace

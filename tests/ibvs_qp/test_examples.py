@@ -25,9 +25,9 @@ NUMBER = re.compile(r"-?\d+\.\d+")
 WITHOUT_OPENCV = ("plain_python", "own_limit", "own_task")
 #: Modules of the others.
 SHARED = ("rigid_body", "drawn_camera")
-#: Needs ROS: it has a test of its own.
-ROS = "ros2_node"
-EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py") if file.stem not in (*SHARED, ROS))
+#: Need ROS, or the simulator (tests/sim/gym_env): they have tests of their own.
+ROS, SIMULATED = "ros2_node", "gym_policies"
+EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py") if file.stem not in (*SHARED, ROS, SIMULATED))
 #: Runs a script where the simulator and everything that draws cannot be imported.
 ALONE = """
 import importlib.abc, os, runpy, sys

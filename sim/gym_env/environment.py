@@ -1,0 +1,187 @@
+"""The environment: one control tick a step, in the closed loop that `sim.flight.closed_loop.fly` runs."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import cv2
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+import ibvs_qp
+from ibvs_qp.config.errors import ConfigError, out_of_range
+from sim.evaluate.truth import Assessment
+from sim.flight.closed_loop import ClosedLoop
+from sim.flight.options import FlightOptions, pilot_config, unsupervised
+from sim.flight.preflight import check_job
+from sim.flight.trace import TIME_OUT, Trace
+from sim.gym_env.observation import observation_space, observe
+from sim.gym_env.reward import PaintReward, RewardSettings
+from sim.world.random_scene import TUNING, random_scene
+from sim.world.scene import Scene
+from sim.world.worlds import DEFAULT_WORLD, in_world
+
+#: Classes of `sim.gym_env.laws` by mode and law.
+LAWS = {
+    ("residual", "qp"): "ResidualQp",
+    ("residual", "paper"): "ResidualPaper",
+    ("thrusts", "qp"): "ThrustLaw",
+    ("thrusts", "paper"): "ThrustLaw",
+}
+#: Largest residual of a rotor [N]: that of the learned policy in examples/own_controller.py.
+RESIDUAL_N = 2.0
+#: Scenes are drawn from so many numbers without a seed [-].
+NUMBERS = 2**31
+#: Rendered picture: width, radius of the tip [px], and colour of the tip (r, g, b).
+PICTURE_PX, TIP_PX, TIP_COLOUR = 640, 5, (220, 30, 30)
+
+Observation = dict[str, np.ndarray]
+
+
+class PaintEnv(gymnasium.Env[Observation, np.ndarray]):
+    """Paint the rows of a board: sensors and estimates in, rotor thrusts out, reward by the truth.
+
+    Attributes:
+        trace: The last flight after its end, for figures of merit and logs; None before.
+
+    Args:
+        action: "residual", added to the thrusts of the law, or "thrusts" alone [N], (n,).
+        law: "qp" or "paper": the law, and the preset of the flight.
+        family: Scenes are drawn from "tuning" or "evaluation" (`sim.world.random_scene`).
+        scene: Flown instead of drawn scenes; the seed then varies start, noise and errors alone.
+        world: Errors of drawn scenes.
+        features: "geometric", the sensor model of lines, or "rendered" pictures, slower.
+        supervised: Whether the pilot's supervisor may take over as in `fly`; None: with residuals only.
+        residual_n: Largest residual [N].
+        time_limit_s: Time-out of an episode [s]; None is that of `fly`.
+        reward: Weights of the reward.
+        render_mode: "rgb_array", the painted board with the true tip, or None.
+
+    Raises:
+        ConfigError: When an argument is refused, or the scene cannot be painted.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 250}  # noqa: RUF012  # control ticks [Hz]
+
+    def __init__(
+        self,
+        action: str = "residual",
+        law: str = "qp",
+        *,
+        family: str = TUNING,
+        scene: Scene | None = None,
+        world: str = DEFAULT_WORLD,
+        features: str = "geometric",
+        supervised: bool | None = None,
+        residual_n: float = RESIDUAL_N,
+        time_limit_s: float | None = None,
+        reward: RewardSettings | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if (action, law) not in LAWS:
+            raise out_of_range("action, law", (action, law), "", f"allowed are {', '.join(map(str, LAWS))}")
+        self.render_mode, self._scene, self._limit_s = render_mode, scene, time_limit_s
+        self._family, self._world, self._weights = family, world, reward or RewardSettings()
+        controller = f"sim.gym_env.laws:{LAWS[action, law]}"
+        self._options = FlightOptions(law=law, controller=controller, features=features, video=False)
+        self._config = ibvs_qp.preset(law)
+        if scene is not None:
+            check_job(scene, pilot_config(scene, self._options, self._config), features)
+        if not (action == "residual" if supervised is None else supervised):
+            self._config = unsupervised(self._config)
+        vehicle = self._config.controller.vehicle
+        self._limits = vehicle.thrust_min, vehicle.thrust_max
+        if action == "residual":
+            self._limits = np.full(vehicle.geometry.count, -residual_n), np.full(vehicle.geometry.count, residual_n)
+        low, high = (side.astype(np.float32) for side in self._limits)
+        self.action_space = spaces.Box(low, high, dtype=np.float32)
+        self._space = observation_space(vehicle)
+        self.observation_space: Any = self._space
+        self.trace: Trace | None = None
+        self._loop: ClosedLoop | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin a flight.
+
+        Args:
+            seed: Number of the scene, and seed of start, noise and errors; None draws one from `np_random`.
+            options: Not used.
+
+        Returns:
+            The first observation, and info.
+        """
+        super().reset(seed=seed)
+        self.close()
+        number = int(self.np_random.integers(NUMBERS)) if seed is None else seed
+        scene = self._scene or in_world(random_scene(number, self._family), self._world)
+        self._loop = loop = ClosedLoop(scene, dataclasses.replace(self._options, seed=number), self._config)
+        loop.limit_s = self._limit_s or loop.limit_s
+        self._reward, self.trace = PaintReward(loop.world, self._weights), None
+        return observe(self._space, loop.pilot, loop.sense()), self._info(loop) | {"scene": number}
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Fly one control tick.
+
+        Args:
+            action: Thrusts or residual [N], (n,); clipped to the action space. One that is not finite becomes a hold.
+
+        Returns:
+            Observation, reward, whether the flight ended by a crash, a touchdown or its strategy, whether it timed
+            out, and info.
+
+        Raises:
+            ConfigError: When the action has another shape.
+        """
+        loop = self._loop
+        if loop is None or not loop.going:
+            raise gymnasium.error.ResetNeeded("the flight is over, or has not begun: call reset")
+        (low, high), thrusts = self._limits, np.array(action, float)
+        if thrusts.shape != low.shape:
+            raise ConfigError(f"action of shape {thrusts.shape} is refused: {low.shape} is needed")
+        finite = bool(np.isfinite(thrusts).all())
+        law: Any = loop.pilot.controller  # a class of `LAWS`
+        law.action = np.clip(thrusts, low, high) if finite else np.full_like(thrusts, np.nan)
+        loop.advance()
+        terms, truncated = self._reward.terms(), loop.reason.startswith(TIME_OUT)
+        observation = observe(self._space, loop.pilot, loop.sense())
+        info = self._info(loop) | {"reward": terms, "refused": "" if finite else "action: not finite"}
+        if not loop.going:
+            self.trace = loop.trace()
+            shortfall = Assessment(self.trace).shortfall or ""
+            info |= {"completed": not shortfall, "shortfall": shortfall}
+        return observation, sum(terms.values()), not loop.going and not truncated, truncated, info
+
+    def _info(self, loop: ClosedLoop) -> dict[str, Any]:
+        """State of the pilot, and truth, which does not belong to the observation."""
+        plant, painter, command = loop.world.plant, loop.pilot.painter, loop.command
+        return {
+            "time_s": loop.time_s,
+            "phase": painter.phase,
+            "outcome": "" if command is None else str(command.outcome),
+            "safety": "" if command is None else str(command.safety),
+            "reason": loop.reason or painter.reason,
+            "true_tip_m": plant.tip,
+            "true_push_n": plant.contact_normal_force,
+            "true_attitude_wxyz": plant.quaternion,
+        }
+
+    def render(self) -> Any:
+        """The painted board and the tip in front of it, uint8 RGB (height, `PICTURE_PX`, 3); None without the mode."""
+        if self.render_mode is None or self._loop is None:
+            return None
+        world, board = self._loop.world, self._loop.world.scene.board
+        scale, (along, up) = PICTURE_PX / board.width_m, world.geometry.spot(*world.plant.tip_on_wall)
+        size = PICTURE_PX, round(scale * board.height_m)
+        picture = np.ascontiguousarray(cv2.resize(world.canvas.rgb, size, interpolation=cv2.INTER_AREA))
+        place = round(scale * along), round(scale * (board.height_m - up))
+        return cv2.circle(picture, place, TIP_PX, TIP_COLOUR, cv2.FILLED)
+
+    def close(self) -> None:
+        """End the flight; may be called again."""
+        if self._loop is not None:
+            self._loop.close()
+        self._loop = None
