@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ log = logging.getLogger(__name__)
 
 #: Every kernel that was imported, with its signature.
 KERNELS: list[tuple[Any, Any]] = []
-#: Time of the last change of any file with a part of kernels: numba itself watches only the file of the kernel.
+#: Time of the last change of any file with a part of kernels: numba itself watches only the file of the kernel. A time
+#: in the future is of another clock and does not count, or every start would compile.
 _changed = [0.0]
 
 
@@ -28,7 +30,9 @@ def inner(function: Callable[..., Any]) -> Any:
     Fractions by zero are those of IEEE 754, sums keep their order, and products and sums are not contracted: all
     processors give the same bits.
     """
-    _changed[0] = max(_changed[0], Path(function.__code__.co_filename).stat().st_mtime)
+    changed = Path(function.__code__.co_filename).stat().st_mtime
+    if changed <= time.time():
+        _changed[0] = max(_changed[0], changed)
     return numba.njit(nogil=True, error_model="numpy")(function)
 
 

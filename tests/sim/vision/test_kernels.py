@@ -7,7 +7,9 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
@@ -65,3 +67,31 @@ def test_vision_loads_where_nothing_is_compiled() -> None:
         [sys.executable, "-c", code], env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True
     )
     assert done.stdout == "loaded\n", done.stderr
+
+
+_STORED = """
+import importlib, sys
+sys.path.insert(0, sys.argv[1])
+kernel = importlib.import_module("some_kernel").kernel_of_parts
+print(kernel(2.0), sum(kernel.stats.cache_hits.values()))
+"""
+
+
+def test_a_clock_behind_the_files_compiles_once_and_an_edit_compiles_again(tmp_path: Path) -> None:
+    """A board without a battery-backed clock starts in the past; the part's own file is not watched by numba."""
+    kernel, part = tmp_path / "some_kernel.py", tmp_path / "some_part.py"
+    part.write_text("from ibvs_qp.vision.compilation import inner\n\n\n@inner\ndef part(x):\n    return x + 1.0\n")
+    kernel.write_text(
+        "from ibvs_qp.vision.compilation import kernel\nfrom some_part import part\n\n\n"
+        "@kernel('f8(f8)')\ndef kernel_of_parts(x):\n    return part(x)\n"
+    )
+    for file in (kernel, part):
+        os.utime(file, (time.time() + 1e6,) * 2)
+
+    def start() -> str:
+        done = subprocess.run([sys.executable, "-B", "-c", _STORED, str(tmp_path)], capture_output=True, text=True)
+        return done.stdout.strip() or done.stderr
+
+    assert [start(), start()] == ["3.0 0", "3.0 1"]
+    part.write_text(part.read_text().replace("1.0", "5.0"))
+    assert start() == "7.0 0"
