@@ -36,7 +36,13 @@ def test_functions(file: Path) -> list[str]:
 
 
 test_functions.__test__ = False  # type: ignore[attr-defined]
-CASES = [pytest.param(file, name, id=f"{file.stem}-{name}") for file in FILES for name in test_functions(file)]
+#: Files that run; all but the first are slow.
+RUN = [pytest.param(file, id=file.stem, marks=[pytest.mark.slow] * (file != FILES[0])) for file in FILES]
+CASES = [
+    pytest.param(file, name, id=f"{file.stem}-{name}", marks=[pytest.mark.slow] * (file != FILES[0]))
+    for file in FILES
+    for name in test_functions(file)
+]
 each = pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
 
 
@@ -51,7 +57,7 @@ def run(file: Path) -> dict:
     return runpy.run_path(str(file))["app"].run()[1]
 
 
-@each
+@pytest.mark.parametrize("file", RUN)
 def test_notebook_runs_and_has_test_cells(file):
     run(file)
     assert test_functions(file)
