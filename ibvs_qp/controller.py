@@ -19,6 +19,7 @@ from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.frames import ordered_product
 from ibvs_qp.limits import ApproachLimit, Limit, PushCeiling, ThrustLimit, TiltLimit, ViewLimit, YawLimit
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.inputs import equations
@@ -183,7 +184,7 @@ class HybridController(CheckedLaw):
         if solution.limited:
             limits = active_limits(self.problem, solution.x, solution.y)
         if solution.limited or data.beyond_limits:
-            unallocated = setpoints.effectiveness.dot(data.free - thrusts)
+            unallocated = ordered_product(setpoints.effectiveness, data.free - thrusts)
             largest = max(map(abs, unallocated.tolist()))
         own = setpoints.note(thrusts, largest)
         return Command(

@@ -56,6 +56,11 @@ def unit(vector: Sequence[float]) -> Vector3:
     return x / length, y / length, z / length
 
 
+def ordered_product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """``matrix @ vector`` with sums in the order of the columns, as in C: a BLAS adds in an order of its own."""
+    return np.multiply(matrix.T, vector[:, None], order="C").sum(axis=0)
+
+
 def skew(vector: np.ndarray) -> np.ndarray:
     """Cross-product matrix: ``skew(a) @ b == cross(a, b)``, shape (3, 3)."""
     x, y, z = vector

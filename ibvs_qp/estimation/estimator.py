@@ -168,7 +168,7 @@ class WallContact:
         if self.surface_offset == 0.0:
             return plane
         a, b, c, d = plane
-        ratio = max(1.0 - self.surface_offset * math.hypot(a, b, c) / abs(d), LEAST_RATIO)
+        ratio = max(1.0 - self.surface_offset * math.sqrt(a * a + b * b + c * c) / abs(d), LEAST_RATIO)
         return a / ratio, b / ratio, c / ratio, d
 
 

@@ -87,12 +87,14 @@ class TickHistory:
         """
         if self._growth[0] != place:
             once = twice = 0.0
-            factors = [(1.0, once, twice)]
+            factors = [(once, twice)]
             for length in self._lengths[place + 1 :]:
                 once, twice = once + length, twice + length * once
-                factors.append((1.0, once, twice))
+                factors.append((once, twice))
             self._growth = place, np.array(factors)
-        self.rows[place : self.place + 1, : changes.shape[1]] += self._growth[1] @ changes
+        once, twice = self._growth[1].T[:, :, None]
+        carried = changes[0] + once * changes[1] + twice * changes[2]  # no matrix product: added in this order in C too
+        self.rows[place : self.place + 1, : changes.shape[1]] += carried
 
 
 def sample_interval(stamp_ns: int, last_ns: int) -> float:

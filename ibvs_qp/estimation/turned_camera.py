@@ -1,4 +1,7 @@
-"""Lines and planes of a camera with any mount, in the axes of one that looks along +x."""
+"""Lines and planes of a camera with any mount, in the axes of one that looks along +x.
+
+Plain numbers in a fixed order of sums: the C library (``pack.c``) has the same bits.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.field_of_view import camera_rotation
 from ibvs_qp.config.settings import stated
+from ibvs_qp.frames import Rotation3, rotate
 from ibvs_qp.measurement import FeatureFrame, LineFeature, Measurement
 from ibvs_qp.validation.geometry import INVERSE_DEPTH_MIN, LINE_BOUND
 
@@ -47,6 +51,7 @@ class TurnedCamera:
 
     def __init__(self, turn_deg: Sequence[float]) -> None:
         self.rotation = camera_rotation(turn_deg)
+        self._rows: Rotation3 = tuple(map(tuple, self.rotation.tolist()))  # type: ignore[assignment]
         self.straight = not any(turn_deg)
 
     def features(self, frame: FeatureFrame, rejected: list[str]) -> FeatureFrame:
@@ -72,7 +77,7 @@ class TurnedCamera:
     def _plane(self, plane: Sequence[float] | None, rejected: list[str]) -> Plane | None:
         if plane is None:
             return None
-        a, b, c = (self.rotation @ plane[:3]).tolist()
+        a, b, c = rotate(self._rows, plane[:3])
         if c < INVERSE_DEPTH_MIN * -plane[3]:
             rejected.append(f"plane: {OUT_OF_VIEW}")
             return None
@@ -80,21 +85,25 @@ class TurnedCamera:
 
     def _line(self, line: LineFeature) -> LineFeature | None:
         cos, sin = math.cos(line.theta), math.sin(line.theta)
-        x, y, z = (self.rotation @ (cos, sin, -line.rho)).tolist()
-        length = math.hypot(x, y)
+        x, y, z = rotate(self._rows, (cos, sin, -line.rho))
+        length = math.sqrt(x * x + y * y)
         if not abs(z) <= LINE_BOUND * length:
             return None
-        rows = self.rotation @ np.array(((0.0, -sin), (0.0, cos), (-1.0, 0.0)))  # d(x, y, z) / d(rho, theta)
-        along = (x * rows[0] + y * rows[1]) / length**2
-        jacobian = np.array(((z * along - rows[2]) / length, (x * rows[1] - y * rows[0]) / length**2))
+        rates = rotate(self._rows, (0.0, 0.0, -1.0)), rotate(self._rows, (-sin, cos, 0.0))  # by rho, by theta
+        turned_rho = [(z * ((x * dx + y * dy) / (length * length)) - dz) / length for dx, dy, dz in rates]
+        turned_theta = [(x * dy - y * dx) / (length * length) for dx, dy, _ in rates]
+        (variance, covariance), (_, theta_variance) = line.covariance.tolist()
+        jacobian = turned_rho, turned_theta
+        rows = [(u * variance + v * covariance, u * covariance + v * theta_variance) for u, v in jacobian]
         segment = line.segment
         if segment is not None:
-            ends = np.column_stack((segment, np.ones(2))) @ self.rotation.T
-            segment = ends[:, :2] / ends[:, 2:] if (ends[:, 2] > 0.0).all() else None
+            ends = [rotate(self._rows, (*end, 1.0)) for end in segment.tolist()]
+            seen = all([depth > 0.0 for *_, depth in ends])
+            segment = np.array([(right / depth, down / depth) for right, down, depth in ends]) if seen else None
         return dataclasses.replace(
             line,
             rho=-z / length,
             theta=math.atan2(y, x),
-            covariance=jacobian @ line.covariance @ jacobian.T,
+            covariance=np.array([[u * a + v * b for a, b in rows] for u, v in jacobian]),
             segment=segment,
         )

@@ -119,7 +119,7 @@ def image_line(
     normal = c * rx + s * dx, c * ry + s * dy, c * rz + s * dz
     along, point = cross(axes.normal, normal), add_scaled(foot, offset, normal)
     front, right, down = cross(point, along)  # normal of the interpretation plane, in B
-    length = math.hypot(right, down)
+    length = math.sqrt(right * right + down * down)  # the bits of the C library, which hypot has not
     if right * normal[1] + down * normal[2] < 0.0:
         length = -length
     return -front / length, math.atan2(down / length, right / length), dot(foot, axes.normal)

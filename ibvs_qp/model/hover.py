@@ -6,7 +6,7 @@ import numpy as np
 
 from allocation import control_effectiveness
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.frames import GRAVITY, down_in_body, roll_pitch
+from ibvs_qp.frames import GRAVITY, down_in_body, ordered_product, roll_pitch
 from ibvs_qp.measurement import Measurement
 from ibvs_qp.model.motion_margin import TICKS_LATE
 
@@ -39,6 +39,6 @@ def hold_thrusts(config: ControllerConfig, measurement: Measurement | None) -> n
         roll, pitch = roll_pitch(measurement.attitude)
         omega = measurement.angular_velocity
         wrench[:3] = -vehicle.mass_kg * GRAVITY * np.array(down_in_body(measurement.attitude))
-        wrench[3:] = -vehicle.inertia @ (kp * np.array([roll, pitch, 0.0]) + kd * np.asarray(omega))
-    thrusts = np.linalg.pinv(control_effectiveness(vehicle.geometry)) @ wrench
+        wrench[3:] = ordered_product(vehicle.inertia, -kp * np.array([roll, pitch, 0.0]) - kd * np.asarray(omega))
+    thrusts = ordered_product(np.linalg.pinv(control_effectiveness(vehicle.geometry)), wrench)
     return np.clip(thrusts, vehicle.thrust_min, vehicle.thrust_max)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ibvs_qp.command import ActiveLimit, Command, Outcome
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.frames import ordered_product
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.hover import hold_thrusts
 from ibvs_qp.model.setpoints import Setpoints
@@ -140,7 +141,7 @@ def _limited(
     rejected: tuple[str, ...],
 ) -> Command:
     beyond = free - clip(setpoints, free)
-    unallocated = setpoints.effectiveness.dot(free - thrusts)
+    unallocated = ordered_product(setpoints.effectiveness, free - thrusts)
     setpoints.note(thrusts, max(map(abs, unallocated.tolist())))
     return Command(
         stamp_ns=stamp_ns,

@@ -11,7 +11,7 @@ from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.estimator import INERTIAL, Estimator
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_motion import BIAS
-from ibvs_qp.frames import rotation_from_vector
+from ibvs_qp.frames import ordered_product, rotation_from_vector
 from ibvs_qp.measurement import FeatureFrame, Measurement, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.pilot.config import PilotConfig
@@ -51,7 +51,7 @@ class Estimation:
         """The frame with force and moment of the sensor in axes of B."""
         if self._force_axes is None:
             return frame
-        force, moment = self._force_axes @ frame.wrench[:3], self._force_axes @ frame.wrench[3:]
+        force, moment = (ordered_product(self._force_axes, part) for part in (frame.wrench[:3], frame.wrench[3:]))
         return dataclasses.replace(frame, wrench=np.concatenate((force, moment)))
 
     def predict(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from allocation import TAROT_T960
 from ibvs_qp.controller import HybridController
-from ibvs_qp.interfaces.c_library.recorded import FlightTick
+from ibvs_qp.interfaces.c_library.recorded import FlightTick, other_solution
 from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.pilot import PilotConfig
 from sim.faults.fault import Fault
@@ -103,5 +103,6 @@ def press_flight(config: PilotConfig, count: int) -> list[FlightTick]:
         command = pilot.step(frame)
         world.act(command.thrusts)
         if pilot.measurement is not None:
-            ticks.append(FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts))
+            other = other_solution(pilot.controller, command)
+            ticks.append(FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts, other))
     return ticks

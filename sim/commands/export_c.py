@@ -5,11 +5,14 @@ from __future__ import annotations
 import dataclasses
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from sim.commands.options import flag, optional, preset_file
+
+if TYPE_CHECKING:
+    from ibvs_qp.pilot import PilotConfig
 
 #: Recorded ticks in the library's self-test: as many as reach into the push.
 RECORDED_TICKS = 2500
@@ -36,10 +39,7 @@ class ExportC:
         from rich.console import Console
 
         from ibvs_qp.config.errors import ConfigError
-        from ibvs_qp.interfaces.c_library.library import write_library
-        from ibvs_qp.interfaces.c_library.recorded import write_flight, write_recorded
         from ibvs_qp.pilot import PilotConfig
-        from sim.bench.ticks import press_flight
         from sim.flight.working import working
 
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
@@ -49,12 +49,24 @@ class ExportC:
         if settings.law != "qp":
             raise ConfigError(f"law: {settings.law!r}; the library has only the quadratic program: 'qp'")
         with working(Console(stderr=True), "Writing the library ..."):
-            controller, flight = settings.controller, press_flight(settings, RECORDED_TICKS)
-            write_library(self.folder, controller, self.float, settings.estimation if self.estimation else None)
-            ticks = [(tick.measurement, tick.reference) for tick in flight]
-            write_recorded(self.folder, controller, ticks, self.float)
-            if self.estimation:
-                write_flight(self.folder, controller, flight, self.float)
+            write_tested_library(self.folder, settings, self.float, self.estimation)
         print(f"Written: {self.folder}")
         print(f"Build and test it: {shlex.join(['make', '-C', str(self.folder), 'test'])}")
         return 0
+
+
+def write_tested_library(folder: Path, settings: PilotConfig, single: bool, estimation: bool) -> None:
+    """Write the library of a pilot's law with the recorded ticks of its self-test."""
+    from ibvs_qp.estimation.turned_camera import TurnedCamera
+    from ibvs_qp.interfaces.c_library.library import write_library
+    from ibvs_qp.interfaces.c_library.recorded import write_flight, write_recorded
+    from sim.bench.ticks import press_flight
+
+    controller, flight = settings.controller, press_flight(settings, RECORDED_TICKS)
+    write_library(folder, controller, single, settings.estimation if estimation else None)
+    # The pilot's measurements are in C, those of a controller in the axes of its camera.
+    camera = TurnedCamera([-angle for angle in controller.vehicle.camera_turn_deg])
+    ticks = [(camera.measurement(tick.measurement, []), tick.reference) for tick in flight]
+    write_recorded(folder, controller, ticks, single)
+    if estimation:
+        write_flight(folder, controller, flight, single)

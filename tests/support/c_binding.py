@@ -26,7 +26,9 @@ class Structures:
         self.real = real = ctypes.c_float if single else ctypes.c_double
         rotors = config.vehicle.geometry.count
         flag, stamp, count = ctypes.c_bool, ctypes.c_int64, ctypes.c_uint32
-        line = structure("ibvs_line", rho=real, theta=real, weight=real, variance=real, stamp_ns=stamp, role=count)
+        numbers = dict.fromkeys(("rho", "theta", "weight", "variance"), real)
+        turned = {"covariance": real, "theta_variance": real}
+        line = structure("ibvs_line", **numbers, stamp_ns=stamp, role=count, **turned)
         self.line_reference = target = structure("ibvs_line_reference", rho=real, theta=real, role=count)
         self.gains = structure("ibvs_gains", **{field.name: real for field in fields(Gains)})
         self.measurement = structure(
@@ -106,6 +108,7 @@ class Structures:
                 line.weight,
                 line.covariance[0, 0],
             )
+            place.covariance, place.theta_variance = line.covariance[0, 1], line.covariance[1, 1]
             place.stamp_ns, place.role = line.stamp_ns, int(line.role == VERTICAL)
         return own
 

@@ -16,7 +16,7 @@ from ibvs_qp.command import Command
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.estimation.tracked_line import TrackedLine
 from ibvs_qp.estimation.wall_motion import SLOTS
-from ibvs_qp.interfaces.c_library.recorded import FlightTick
+from ibvs_qp.interfaces.c_library.recorded import FlightTick, other_solution
 from ibvs_qp.measurement import VERTICAL, FeatureFrame, Measurement, Reference, SensorFrame
 from ibvs_qp.pilot import Pilot
 from tests.replay.cases import CASES
@@ -73,7 +73,8 @@ def flown(pilot: Pilot, frames: Sequence[SensorFrame], derated: int = -1, most_n
         command = pilot.step(frame)
         assert pilot.measurement is not None
         followed = tuple(line.track_id for line in pilot.measurement.lines)
-        tick = FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts)
+        other = other_solution(pilot.controller, command)
+        tick = FlightTick(frame, pilot.measurement, pilot.reference, command.thrusts, other)
         ticks.append(PilotTick(tick, followed, estimated(pilot, asked), command))
     return ticks
 
@@ -143,7 +144,7 @@ class CFlight:
             thrust_max=real * rotors,
         )
         numbers = {name: real for name in ("rho", "theta", "variance", "weight")}
-        seen = {"has_segment": flag, "segment": real * 4}
+        seen = {"has_segment": flag, "segment": real * 4, "covariance": real, "theta_variance": real}
         line = {"track_id": stamp, "role": whole, "kind": whole, "surface_side": whole}
         self._features = structure(
             "ibvs_features",
@@ -228,6 +229,7 @@ class CFlight:
             for name in ("track_id", "surface_side", "rho", "theta", "weight"):
                 setattr(place, name, getattr(line, name))
             place.role, place.kind, place.variance = int(line.role == VERTICAL), KINDS[line.kind], line.covariance[0, 0]
+            place.covariance, place.theta_variance = line.covariance[0, 1], line.covariance[1, 1]
             place.has_segment = line.segment is not None
             if line.segment is not None:
                 place.segment[:] = line.segment.ravel().tolist()

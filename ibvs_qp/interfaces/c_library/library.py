@@ -62,8 +62,6 @@ def write_library(
 
 
 def _check(config: ControllerConfig, single: bool) -> None:
-    if any(config.vehicle.camera_turn_deg):
-        raise ConfigError("vehicle.camera_turn_deg: the C library has no turned camera, so it must be (0, 0, 0) deg")
     if not config.thrust_rows:
         raise ConfigError("thrust_rows: the C library keeps the thrust limits in the program, so it must be true")
     if config.solver.name != "osqp":

@@ -8,20 +8,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ibvs_qp.command import Command, Outcome
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
-from ibvs_qp.measurement import VERTICAL, FeatureFrame, Measurement, Reference, SensorFrame
+from ibvs_qp.measurement import VERTICAL, FeatureFrame, LineFeature, Measurement, Reference, SensorFrame
 from ibvs_qp.qp.program_code import real, reals
 from ibvs_qp.validation.fields import REFERENCE, field_table
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 
-#: Largest difference from the thrusts of Python [N], in double and in single precision: row filters carry the rounding
-#: of a tick on to the next ones.
-TOLERANCE, SINGLE_TOLERANCE_N = 5e-6, 0.03
-#: The same with estimation [N]: rounding of the estimates is added.
-FLIGHT_TOLERANCE, SINGLE_FLIGHT_TOLERANCE_N = 5e-6, 0.05
+#: Largest difference from the thrusts of Python [N]: in double precision, for rounding by another compiler; in single
+#: precision, where row filters carry the rounding of a tick on to the next ones, and there with estimation.
+TOLERANCE_N, SINGLE_TOLERANCE_N, SINGLE_FLIGHT_TOLERANCE_N = 1e-6, 0.03, 0.05
 #: Kinds of edges as in ``ibvs_edge``.
 EDGES = {"board": "IBVS_BOARD_EDGE", "paint": "IBVS_PAINT_EDGE"}
+
+#: Solution and multipliers of a tick.
+OtherSolution = tuple[np.ndarray, np.ndarray]
 
 
 class FlightTick(NamedTuple):
@@ -31,6 +33,20 @@ class FlightTick(NamedTuple):
     measurement: Measurement  # of the law
     reference: Reference
     thrusts: np.ndarray  # [N], (n,)
+    other: OtherSolution | None = None
+
+
+def other_solution(controller: Any, command: Command) -> OtherSolution | None:
+    """Solution and multipliers of the last tick where Python has them from DAQP.
+
+    They differ from those of the library's active set in their last digits, which decide where OSQP stops within its
+    tolerance in the next limited ticks: a replay continues from them.
+    """
+    if command.outcome is not Outcome.EXACT_FALLBACK:
+        return None
+    data = controller.engine.data
+    found = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
+    return found.x, found.y
 
 
 def write_recorded(
@@ -45,7 +61,11 @@ def write_recorded(
         single: Whether the library's numbers are floats.
     """
     controller, slots = HybridController(config), config.line_slots
-    thrusts = [controller.step(*tick).thrusts for tick in ticks]
+    thrusts, others = [], []
+    for tick in ticks:
+        command = controller.step(*tick)
+        thrusts.append(command.thrusts)
+        others.append(other_solution(controller, command))
     parts = {
         "measurement ibvs_recorded_measurements": [_measurement(tick[0], slots, single) for tick in ticks],
         "reference ibvs_recorded_references": [_reference(tick[1], slots, single) for tick in ticks],
@@ -56,8 +76,9 @@ def write_recorded(
     for name, rows in parts.items():
         second = "[IBVS_ROTORS]" if name.startswith("real") else ""
         code += [f"const ibvs_{name}[IBVS_RECORDED_TICKS]{second} = {{", ",\n".join(rows), "};", ""]
+    code += _other_solutions("recorded", others, single)
     (folder / "ibvs_recorded_ticks.c").write_text("\n".join(code))
-    tolerance = real(SINGLE_TOLERANCE_N if single else TOLERANCE, single)
+    tolerance = real(SINGLE_TOLERANCE_N if single else TOLERANCE_N, single)
     (folder / "ibvs_recorded_ticks.h").write_text(_HEADER.format(count=len(ticks), tolerance=tolerance))
 
 
@@ -90,10 +111,19 @@ def write_flight(folder: Path, config: ControllerConfig, ticks: Sequence[FlightT
         ",\n".join(rows),
         "};",
         "",
+        *_other_solutions("flight", [tick.other for tick in ticks], single),
     ]
     (folder / "ibvs_recorded_flight.c").write_text("\n".join(code))
-    tolerance = real(SINGLE_FLIGHT_TOLERANCE_N if single else FLIGHT_TOLERANCE, single)
+    tolerance = real(SINGLE_FLIGHT_TOLERANCE_N if single else TOLERANCE_N, single)
     (folder / "ibvs_recorded_flight.h").write_text(_FLIGHT_HEADER.format(count=len(ticks), tolerance=tolerance))
+
+
+def _other_solutions(name: str, found: Sequence[OtherSolution | None], single: bool) -> list[str]:
+    """Table of solutions by tick; the last entry ends it."""
+    named = [(tick, *other) for tick, other in enumerate(found) if other is not None]
+    rows = [_structure(single, tick=str(tick), x=x, multipliers=y) for tick, x, y in named]
+    end = "{.tick = UINT32_MAX}"
+    return [f"const ibvs_other_solution ibvs_{name}_others[] = {{", ",\n".join([*rows, end]), "};", ""]
 
 
 def _frame(tick: FlightTick, single: bool) -> str:
@@ -117,7 +147,7 @@ def _features(features: FeatureFrame, config: ControllerConfig, single: bool) ->
             surface_side=line.surface_side,
             rho=line.rho,
             theta=line.theta,
-            variance=line.covariance.item(0),
+            **_variances(line),
             weight=line.weight,
             has_segment=line.segment is not None,
             segment=None if line.segment is None else line.segment.ravel(),
@@ -126,6 +156,11 @@ def _features(features: FeatureFrame, config: ControllerConfig, single: bool) ->
     ]
     stamps = {"stamp_ns": features.stamp_ns, "velocity_stamp_ns": features.velocity_stamp_ns}
     return _structure(single, **stamps, **members, **known, line_count=len(lines), lines=lines)
+
+
+def _variances(line: LineFeature) -> dict[str, float]:
+    (variance, covariance), (_, theta_variance) = line.covariance.tolist()
+    return {"variance": variance, "covariance": covariance, "theta_variance": theta_variance}
 
 
 def _measurement(measurement: Measurement, slots: int, single: bool) -> str:
@@ -142,7 +177,7 @@ def _measurement(measurement: Measurement, slots: int, single: bool) -> str:
             rho=line.rho,
             theta=line.theta,
             weight=line.weight,
-            variance=line.covariance.item(0),
+            **_variances(line),
             stamp_ns=line.stamp_ns,
             role=line.role == VERTICAL,
         )
@@ -180,7 +215,7 @@ _HEADER = """/* Recorded flight for self-test and benchmark; generated. */
 #ifndef IBVS_RECORDED_TICKS_H
 #define IBVS_RECORDED_TICKS_H
 
-#include "ibvs_qp.h"
+#include "ibvs_internal.h"
 
 #define IBVS_RECORDED_TICKS {count}
 /* Largest difference from the thrusts of Python [N]. */
@@ -189,6 +224,7 @@ _HEADER = """/* Recorded flight for self-test and benchmark; generated. */
 extern const ibvs_measurement ibvs_recorded_measurements[IBVS_RECORDED_TICKS];
 extern const ibvs_reference ibvs_recorded_references[IBVS_RECORDED_TICKS];
 extern const ibvs_real ibvs_recorded_thrusts[IBVS_RECORDED_TICKS][IBVS_ROTORS];
+extern const ibvs_other_solution ibvs_recorded_others[]; /* ticks that Python solved with DAQP; the last one ends it */
 
 #endif
 """
@@ -197,6 +233,7 @@ _FLIGHT_HEADER = """/* Recorded flight with estimation; generated. */
 #define IBVS_RECORDED_FLIGHT_H
 
 #include "ibvs_estimation.h"
+#include "ibvs_internal.h"
 
 #define IBVS_RECORDED_FLIGHT_TICKS {count}
 /* Largest difference from the thrusts of Python [N]. */
@@ -212,6 +249,7 @@ typedef struct {{
 }} ibvs_recorded_tick;
 
 extern const ibvs_recorded_tick ibvs_recorded_flight[IBVS_RECORDED_FLIGHT_TICKS];
+extern const ibvs_other_solution ibvs_flight_others[]; /* ticks that Python solved with DAQP; the last one ends it */
 
 #endif
 """

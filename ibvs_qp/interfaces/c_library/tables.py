@@ -12,6 +12,7 @@ import numpy as np
 from allocation import DEFAULT_ROW_WEIGHTS, control_effectiveness
 from ibvs_qp.analytic import RANK_TOLERANCE
 from ibvs_qp.config import Gains
+from ibvs_qp.config.field_of_view import camera_rotation
 from ibvs_qp.frames import GRAVITY
 from ibvs_qp.interfaces.c_library.tick_code import TickCode
 from ibvs_qp.measurement import Measurement, Reference
@@ -46,6 +47,8 @@ def write_layout(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "REFERENCE_FIELDS": len(REFERENCE.rows),
         "RECOVERY_TICKS": config.solver.recovery_ticks,
         "RESTART_STAMPS": clock.RESTART_STAMPS,
+        "TURNED_CAMERA": int(any(vehicle.camera_turn_deg)),
+        "UNIQUE_THRUSTS": int(np.linalg.matrix_rank(control_effectiveness(vehicle.geometry)) == problem.model.rotors),
     }
     times = {name: getattr(clock, name) for name in ("STAMP_END", "JUMP_NS", "RESTART_NS", "LEAD_NS")}
     times["OLDEST_LINE_NS"] = OLDEST_LINE_NS
@@ -128,6 +131,7 @@ def write_tables(folder: Path, problem: QpProblem, tick: TickCode, single: bool)
         "inverse": np.linalg.pinv(effectiveness),
         "mass_matrix": vehicle.mass_matrix,
         "allocation_weights": DEFAULT_ROW_WEIGHTS,
+        "camera_turn": camera_rotation(vehicle.camera_turn_deg),
     }
     lines = [
         "/* Bounds of the inputs, start values and vehicle; generated. */",

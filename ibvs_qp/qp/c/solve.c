@@ -328,6 +328,9 @@ static bool solve_loaded(ibvs_program *program, ibvs_solution *solution) {
   memcpy(solution->multipliers, y, sizeof solution->multipliers);
   if (sound && (IBVS_FLOAT || !good) && ibvs_active_set(program, solution->multipliers, solution->x)) {
     solution->outcome = good ? solution->outcome : IBVS_REFINED;
+    if (!good) { /* OSQP continues from the exact solution, as in Python */
+      ibvs_warm_start(program, solution->x, solution->multipliers);
+    }
   } else if (good) {
     memcpy(solution->multipliers, y, sizeof solution->multipliers);
     memcpy(solution->x, x, sizeof solution->x);

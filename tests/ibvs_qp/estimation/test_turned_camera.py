@@ -93,13 +93,13 @@ def test_a_controller_flies_a_turned_camera_like_a_straight_one(law: Callable[..
         for vehicle in (VehicleParams(), VehicleParams(camera_turn_deg=turn))
     ]
     straight, real = (law(config) for config in settings)
-    camera, vehicle = TurnedCamera(turn), SmallVehicle(ControllerConfig(), distance=0.3)
-    camera.rotation = camera.rotation.T  # from the straight camera to the real one
+    back = TurnedCamera([-angle for angle in turn])  # from the straight camera to the real one
+    vehicle = SmallVehicle(ControllerConfig(), distance=0.3)
     reference = Reference(standoff=0.2, lines=line_references(2))
     vehicle.position = vehicle.position + np.array((0.0, 0.03, 0.02))
     for _ in range(100):
         measured = vehicle.measure()
         command = straight.step(measured, reference)
-        other = real.step(camera.measurement(replace(measured), []), reference)
+        other = real.step(back.measurement(replace(measured), []), reference)
         assert other.rejected == () and other.thrusts == pytest.approx(command.thrusts, abs=1e-6)
         vehicle.fly(command.thrusts)

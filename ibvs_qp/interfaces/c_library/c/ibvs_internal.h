@@ -29,6 +29,7 @@ extern const ibvs_real ibvs_start_states[IBVS_STATES];
 extern const ibvs_real ibvs_thrust_floor[IBVS_ROTORS], ibvs_thrust_ceiling[IBVS_ROTORS];
 extern const ibvs_real ibvs_effectiveness[6][IBVS_ROTORS], ibvs_inverse[IBVS_ROTORS][6];
 extern const ibvs_real ibvs_mass_matrix[6][6], ibvs_allocation_weights[6];
+extern const ibvs_real ibvs_camera_turn[3][3]; /* from the real camera to C */
 
 /* ibvs_tick.c, generated */
 void ibvs_tick(const ibvs_real *const *arguments, ibvs_real *const *results);
@@ -47,6 +48,21 @@ bool ibvs_check_gains(ibvs_controller *c);
 
 /* pack.c */
 void ibvs_pack(ibvs_controller *c, const ibvs_measurement *m);
+
+/* Features of a turned camera in C; false where they are out of view there. */
+bool ibvs_turn_plane(ibvs_real plane[4]);
+bool ibvs_turn_line(ibvs_real *rho, ibvs_real *theta, ibvs_real *variance, ibvs_real covariance,
+                    ibvs_real theta_variance);
+void ibvs_turn_point(const ibvs_real point[3], ibvs_real turned[3]);
+
+/* ibvs_qp.c, for replays: continues from the flown thrusts of the last tick and of the one before, which the recorded
+ * inputs answer; other: solution of another solver from which OSQP continues, or NULL */
+typedef struct {
+  uint32_t tick;
+  ibvs_real x[IBVS_VARIABLES], multipliers[IBVS_ROWS];
+} ibvs_other_solution;
+void ibvs_follow(ibvs_controller *c, const ibvs_real *before, const ibvs_real *thrusts,
+                 const ibvs_other_solution *other);
 
 /* fallback.c; ibvs_allocate overwrites the program */
 void ibvs_hold_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTORS]);

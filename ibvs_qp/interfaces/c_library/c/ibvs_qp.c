@@ -119,6 +119,34 @@ static void fall_back(ibvs_controller *c, ibvs_command_result *command) {
   finish(c, free, thrusts, true, command);
 }
 
+void ibvs_follow(ibvs_controller *c, const ibvs_real *before, const ibvs_real *thrusts,
+                 const ibvs_other_solution *other) {
+  ibvs_command_result command;
+  memcpy(c->thrusts, before, sizeof c->thrusts);
+  finish(c, c->free, thrusts, c->unallocated > 0, &command);
+  if (other != NULL) {
+    ibvs_warm_start(&c->program, other->x, other->multipliers);
+  }
+}
+
+/* Lines and plane of a turned camera in C. */
+static void straighten(ibvs_measurement *m, uint32_t *rejected) {
+  uint32_t kept = 0;
+  for (uint32_t i = 0; i < m->line_count; ++i) {
+    ibvs_line line = m->lines[i];
+    if (ibvs_turn_line(&line.rho, &line.theta, &line.variance, line.covariance, line.theta_variance)) {
+      m->lines[kept] = line;
+      kept += 1;
+    }
+  }
+  *rejected |= kept < m->line_count ? IBVS_REJECT_LINES : 0;
+  m->line_count = kept;
+  if (m->has_plane && !ibvs_turn_plane(m->plane)) {
+    *rejected |= IBVS_REJECT_PLANE;
+    m->has_plane = false;
+  }
+}
+
 void ibvs_step_packed(ibvs_controller *c, ibvs_command_result *command) {
   ibvs_solution solution;
   evaluate(c);
@@ -168,6 +196,9 @@ void ibvs_step(ibvs_controller *c, const ibvs_measurement *measurement, const ib
   if (!flown) {
     pause(c, command);
     return;
+  }
+  if (IBVS_TURNED_CAMERA && c->inputs[IBVS_IN_GIVEN] == 0) { /* those of the estimation are in C */
+    straighten(&own, &command->rejected);
   }
   ibvs_pack(c, &own);
   ibvs_step_packed(c, command);

@@ -2,6 +2,7 @@
  *
  * Frames: body B is forward-right-down at the centre of mass; camera C is right-down-forward. A quaternion
  * (w, x, y, z) turns vectors of B into the inertial frame I (north-east-down; its yaw is arbitrary). SI units.
+ * With a turned camera (IBVS_TURNED_CAMERA) measured lines and planes are in its own axes, references in C.
  * Stamps are nanoseconds of one monotonic clock.
  *
  * One ibvs_controller is one instance. There is no global state, no allocation and no blocking call; the largest
@@ -32,6 +33,7 @@ typedef struct {
   ibvs_real variance; /* of rho */
   int64_t stamp_ns;   /* time at which the line was as described, 0 if unknown */
   ibvs_role role;
+  ibvs_real covariance, theta_variance; /* of rho and theta, of theta; used with a turned camera only */
 } ibvs_line;
 
 /* Sensors of one tick; an optional entry counts where its flag is true. */

@@ -85,6 +85,48 @@ static void pack_lines(ibvs_controller *c, const ibvs_measurement *m) {
   }
 }
 
+void ibvs_turn_point(const ibvs_real point[3], ibvs_real turned[3]) {
+  for (uint32_t i = 0; i < 3; ++i) {
+    const ibvs_real *row = ibvs_camera_turn[i];
+    turned[i] = row[0] * point[0] + row[1] * point[1] + row[2] * point[2];
+  }
+}
+
+bool ibvs_turn_plane(ibvs_real plane[4]) {
+  const ibvs_real normal[3] = {plane[0], plane[1], plane[2]};
+  if (!IBVS_TURNED_CAMERA) {
+    return true;
+  }
+  ibvs_turn_point(normal, plane);
+  return !(plane[2] < IBVS_INVERSE_DEPTH_MIN * -plane[3]);
+}
+
+/* See ibvs_qp.estimation.turned_camera, of which it has the bits. */
+bool ibvs_turn_line(ibvs_real *rho, ibvs_real *theta, ibvs_real *variance, ibvs_real covariance,
+                    ibvs_real theta_variance) {
+  const ibvs_real cosine = r_cos(*theta), sine = r_sin(*theta);
+  const ibvs_real normal[3] = {cosine, sine, -*rho}, points[2][3] = {{0, 0, -1}, {-sine, cosine, 0}};
+  ibvs_real turned[3], rate[3], by[2]; /* by: derivatives of the turned rho by rho and theta */
+  if (!IBVS_TURNED_CAMERA) {
+    return true;
+  }
+  ibvs_turn_point(normal, turned);
+  const ibvs_real x = turned[0], y = turned[1], z = turned[2], length = r_sqrt(x * x + y * y);
+  if (!(r_fabs(z) <= IBVS_LINE_BOUND * length && r_fabs(covariance) <= IBVS_VARIANCE_BOUND && theta_variance >= 0 &&
+        theta_variance <= IBVS_VARIANCE_BOUND)) {
+    return false;
+  }
+  for (uint32_t i = 0; i < 2; ++i) {
+    ibvs_turn_point(points[i], rate);
+    by[i] = (z * ((x * rate[0] + y * rate[1]) / (length * length)) - rate[2]) / length;
+  }
+  const ibvs_real along = by[0] * *variance + by[1] * covariance, across = by[0] * covariance + by[1] * theta_variance;
+  *variance = r_fmax(by[0] * along + by[1] * across, 0);
+  *rho = -z / length;
+  *theta = r_atan2(y, x);
+  return true;
+}
+
 static void put(ibvs_controller *c, uint32_t place, const ibvs_real *values, uint32_t count, bool known) {
   for (uint32_t i = 0; i < count; ++i) {
     c->inputs[place + i] = known ? values[i] : 0;

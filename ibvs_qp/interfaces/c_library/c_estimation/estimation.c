@@ -99,6 +99,19 @@ static bool sound_line(const ibvs_line_feature *line) {
          line->surface_side >= -1 && line->surface_side <= 1;
 }
 
+/* A line of a turned camera in C; false where it is out of view there. */
+static bool straighten(ibvs_line_feature *line) {
+  for (uint32_t i = 0; IBVS_TURNED_CAMERA && i < 4; i += 2) {
+    const ibvs_real end[3] = {line->segment[i], line->segment[i + 1], 1};
+    ibvs_real turned[3];
+    ibvs_turn_point(end, turned);
+    line->has_segment = line->has_segment && turned[2] > 0;
+    line->segment[i] = turned[0] / turned[2];
+    line->segment[i + 1] = turned[1] / turned[2];
+  }
+  return ibvs_turn_line(&line->rho, &line->theta, &line->variance, line->covariance, line->theta_variance);
+}
+
 /* Prediction. */
 
 static void predict(ibvs_flight *f, bool plane_new) {
@@ -199,18 +212,18 @@ static void correct(ibvs_flight *f, const ibvs_features *features, int64_t stamp
     ibvs_correct_velocity(f, features, stamp_ns, velocity_ns, wall);
   }
   for (uint32_t i = 0; i < count; ++i) {
-    const ibvs_line_feature *line = &features->lines[i];
-    bool sound = sound_line(line);
-    ids[i] = sound ? line->track_id : 0;
+    ibvs_line_feature line = features->lines[i];
+    bool sound = sound_line(&line) && straighten(&line);
+    ids[i] = sound ? line.track_id : 0;
     if (sound && ids[i] == 0) {
-      ids[i] = next[line->role];
-      next[line->role] -= 2;
+      ids[i] = next[line.role];
+      next[line.role] -= 2;
     }
     for (uint32_t k = 0; k < i; ++k) {
       sound = sound && ids[k] != ids[i];
     }
     if (sound) {
-      ibvs_correct_line(f, line, ids[i], stamp_ns, wall);
+      ibvs_correct_line(f, &line, ids[i], stamp_ns, wall);
     } else {
       *rejected |= IBVS_REJECT_LINES;
     }
@@ -258,13 +271,15 @@ void ibvs_estimate(ibvs_flight *f, const ibvs_frame *frame, const ibvs_features 
       features = NULL;
     }
     bool plane_new = features != NULL && features->has_plane;
-    if (plane_new && !ibvs_good_plane(features->plane)) {
-      rejected |= IBVS_REJECT_PLANE;
-      plane_new = false;
-    }
     if (plane_new) {
-      memcpy(f->plane, features->plane, sizeof f->plane);
-      f->plane_ns = capture_ns;
+      ibvs_real plane[4];
+      memcpy(plane, features->plane, sizeof plane);
+      plane_new = ibvs_good_plane(plane) && ibvs_turn_plane(plane);
+      rejected |= plane_new ? 0 : IBVS_REJECT_PLANE;
+      if (plane_new) {
+        memcpy(f->plane, plane, sizeof f->plane);
+        f->plane_ns = capture_ns;
+      }
     }
     predict(f, plane_new);
     if (features != NULL) {

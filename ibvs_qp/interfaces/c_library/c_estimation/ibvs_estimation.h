@@ -40,6 +40,7 @@ typedef struct {
   ibvs_real weight;     /* 0 to 1 */
   bool has_segment;
   ibvs_real segment[4]; /* visible end points x1, y1, x2, y2 */
+  ibvs_real covariance, theta_variance; /* of rho and theta, of theta; used with a turned camera only */
 } ibvs_line_feature;
 
 /* Features of one picture at its capture; a plane alone is one without lines. */

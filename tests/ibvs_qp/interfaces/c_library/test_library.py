@@ -216,16 +216,6 @@ def test_single_precision_of_a_redundant_vehicle_is_refused(tmp_path: Any) -> No
         write_library(tmp_path, CASES["octorotor"].config().controller, single=True)
 
 
-@pytest.mark.parametrize(
-    ("changes", "name"),
-    [({"thrust_rows": False}, "thrust_rows"), ({"camera": (5.0, 0.0, 0.0)}, "vehicle.camera_turn_deg")],
-)
-def test_what_the_library_has_not_is_refused_by_name(changes: dict[str, Any], name: str, tmp_path: Any) -> None:
-    config = CONFIG
-    if "camera" in changes:
-        vehicle = dataclasses.replace(config.vehicle, camera_turn_deg=changes["camera"])
-        config = dataclasses.replace(config, vehicle=vehicle)
-    else:
-        config = dataclasses.replace(config, **changes)
-    with pytest.raises(ConfigError, match=name):
-        write_library(tmp_path, config)
+def test_what_the_library_has_not_is_refused_by_name(tmp_path: Any) -> None:
+    with pytest.raises(ConfigError, match="thrust_rows"):
+        write_library(tmp_path, dataclasses.replace(CONFIG, thrust_rows=False))
