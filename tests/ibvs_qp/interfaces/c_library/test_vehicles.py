@@ -38,6 +38,7 @@ STRAIGHT = "camera_turn_deg = [0.0, 0.0, 0.0]"
 PACKED, BROKEN = "inputs[RHO] = line->rho;", "inputs[RHO] = line->rho + (ibvs_real)1e-3;"
 
 
+@pytest.mark.slow
 def test_an_octorotor_with_a_turned_camera_passes_in_a_shell_and_fails_for_broken_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
