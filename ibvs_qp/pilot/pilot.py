@@ -192,6 +192,11 @@ class Pilot:
         )
 
     @property
+    def waits_for(self) -> str:
+        """Condition for which the strategy's phase waits; empty at its end, or for none that is known."""
+        return self.planning.waits_for(self.estimation)
+
+    @property
     def painter(self) -> Strategy:
         """The strategy."""
         return self.planning.painter

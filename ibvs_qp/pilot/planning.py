@@ -65,7 +65,24 @@ class Planning:
         ``push_reference`` is that of the tick before: the controller runs after the strategy.
         """
         motion, contact, rotors = estimation.motion, estimation.contact.state, supervision.rotor_loss
-        inputs = PainterInput(
+        inputs = self._inputs(estimation, push_reference)
+        if rotors.update(limits):
+            self.painter.abandon(inputs, "no level hover is left")
+        elif supervision.state not in FLYING and not self.painter.descending:
+            self.painter.stop(inputs, "; ".join(supervision.supervisor.reasons))
+        command = self.painter.fly(inputs)
+        if self.painter.fault:
+            rejected.append(self.painter.fault)
+        attitude = rotors.target(contact, estimation.estimator.attitude, motion.state[0], dt)
+        return dataclasses.replace(command, **attitude) if attitude else command
+
+    def waits_for(self, estimation: Estimation) -> str:
+        """Condition for which the strategy's phase waits; empty at its end, or where it names none."""
+        return "" if self.painter.finished else self.painter.waits_for(self._inputs(estimation, 0.0))
+
+    def _inputs(self, estimation: Estimation, push_reference: float) -> PainterInput:
+        motion, contact = estimation.motion, estimation.contact.state
+        return PainterInput(
             time_s=self.time_s,
             lines=MappingProxyType(motion.lines),  # a strategy of the user's must not lose lines of the filter
             odometer=motion.state[4:6],
@@ -78,15 +95,6 @@ class Planning:
             push_reference=push_reference,
             tared=estimation.estimator.tared,
         )
-        if rotors.update(limits):
-            self.painter.abandon(inputs, "no level hover is left")
-        elif supervision.state not in FLYING and not self.painter.descending:
-            self.painter.stop(inputs, "; ".join(supervision.supervisor.reasons))
-        command = self.painter.fly(inputs)
-        if self.painter.fault:
-            rejected.append(self.painter.fault)
-        attitude = rotors.target(contact, estimation.estimator.attitude, motion.state[0], dt)
-        return dataclasses.replace(command, **attitude) if attitude else command
 
     def reference(self, command: PaintingCommand, contact: ContactState) -> Reference:
         """Reference of a command at the measured distance."""

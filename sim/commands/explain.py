@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
+#: Log in a run folder of ``replay BAG``.
+BAG_LOG = "bag.mcap"
 #: Arrays of the log that the explanation prints.
 _NEEDED = (
     "phase", "outcome", "push_measured", "push_reference", "reach_margin", "contact_weight", "iterations", "thrusts",
@@ -74,10 +76,11 @@ class Explain:
         from sim.flight.flight_log import load_run
         from sim.flight.unfinished import JOURNALS
 
-        if self.run_dir.is_file():
+        log = self.run_dir / BAG_LOG if (self.run_dir / BAG_LOG).exists() else self.run_dir
+        if log.is_file():
             from sim.evaluate.logged_tick import logged_tick
 
-            return logged_tick(self.run_dir, self.at)
+            return logged_tick(log, self.at)
         if not (self.run_dir / "log.npz").exists() and not any(self.run_dir.glob(f"{JOURNALS}*")):
             raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
@@ -93,7 +96,7 @@ class Explain:
 
     def _tick(self, trace: Trace) -> int:
         first, last = float(trace.t[0]), float(trace.t[-1])
-        if self.run_dir.is_file():
+        if len(trace.t) == 1:  # of a log
             return 0
         if not first - 1e-6 <= self.at <= last + 1e-6:
             raise IbvsQpError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")

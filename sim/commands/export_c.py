@@ -29,6 +29,8 @@ class ExportC:
     """New or empty folder."""
     preset: Annotated[Path | None, optional("FILE")] = None
     """Preset (TOML) or the name of a shipped one; vehicle, limits and weights are compiled in."""
+    vehicle: Annotated[Path | None, optional("FILE")] = None
+    """Vehicle in place of the preset's: as of ``ibvs-qp vehicle``."""
     float: Annotated[bool, flag] = False
     """Single precision, for a microcontroller without a double-precision unit."""
     estimation: Annotated[bool, flag] = False
@@ -41,11 +43,15 @@ class ExportC:
         from ibvs_qp.config.errors import ConfigError
         from ibvs_qp.pilot import PilotConfig
         from sim.flight.working import working
+        from sim.vehicles.configuration import with_vehicle
+        from sim.vehicles.vehicle_file import read_vehicle
 
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
             raise ConfigError(f"DIR: {self.folder} exists and is not an empty folder")
         chosen = preset_file(self.preset, "--preset")
         settings = PilotConfig() if chosen is None else PilotConfig.from_toml(chosen)
+        if (file := preset_file(self.vehicle, "--vehicle", other_formats=True)) is not None:
+            settings = with_vehicle(settings, read_vehicle(file).vehicle)
         if settings.law != "qp":
             raise ConfigError(f"law: {settings.law!r}; the library has only the quadratic program: 'qp'")
         with working(Console(stderr=True), "Writing the library ..."):

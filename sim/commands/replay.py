@@ -50,6 +50,8 @@ class ReplayCommand:
         import ibvs_qp.interfaces.log  # noqa: F401  # names the extra where it is missing: both kinds need it
         from ibvs_qp.interfaces.ros.recording import is_bag
 
+        if self.log.name == "metadata.yaml":  # the part of a bag that a file dialog offers
+            return dataclasses.replace(self, log=self.log.parent)._bag()
         return self._bag() if is_bag(self.log) else self._log()
 
     def _bag(self) -> int:

@@ -28,6 +28,8 @@ class BagFlight:
         safety: Frames in every state of the supervisor, and the last reasons of those that are not nominal.
         outcomes: Commands by outcome.
         rejected: Inputs that the pilot refused, by reason without its numbers.
+        rejected_last: The last reason of each with its numbers.
+        end: Phase at the end, and the condition that it waits for.
         left_out: Messages of the bag that made no frame, by role and reason.
         poses: Of camera and force sensor from the base frame by ``/tf_static``, front-right-down [m].
         differences: Of the bag from its own statements, and of its poses from the vehicle.
@@ -41,6 +43,8 @@ class BagFlight:
     safety_reasons: dict[str, str] = dataclasses.field(default_factory=dict)
     outcomes: dict[str, int] = dataclasses.field(default_factory=dict)
     rejected: dict[str, int] = dataclasses.field(default_factory=dict)
+    rejected_last: dict[str, str] = dataclasses.field(default_factory=dict)
+    end: str = ""
     left_out: dict[str, int] = dataclasses.field(default_factory=dict)
     poses: dict[str, list[float]] = dataclasses.field(default_factory=dict)
     differences: list[str] = dataclasses.field(default_factory=list)
@@ -63,11 +67,24 @@ def read_topics(file: Path | None) -> Topics:
 
 
 def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFlight:
-    """Step a pilot with every frame of a bag, and record it."""
+    """Step a pilot with every frame of a bag, and record it.
+
+    Raises:
+        ConfigError: When the bag is refused or makes no frame; there is no log then.
+    """
+    try:
+        return _fly_bag(path, topics, config, log)
+    except BaseException:
+        log.unlink(missing_ok=True)
+        raise
+
+
+def _fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFlight:
     import warnings
 
     import numpy as np
 
+    from ibvs_qp.config.errors import ConfigError
     from ibvs_qp.interfaces.log import Recorder
     from ibvs_qp.interfaces.ros.bag import Bag
     from ibvs_qp.interfaces.ros.static_poses import differences
@@ -80,9 +97,11 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
         warnings.simplefilter("ignore")  # the differences are printed
         frames = bag.sensor_frames(config.controller.tick_s, config.camera.distortion)
         stack.callback(frames.close)
-        first = next(frames, None)  # a bag that is refused leaves no log
+        if (first := next(frames, None)) is None:
+            most = [f"{count} times {reason}" for reason, count in bag.held.ignored.most_common(MOST_REASONS)]
+            raise ConfigError(f"{path}: no frame can be made; left out: {'; '.join(most) or 'no message of the IMU'}")
         recorder = stack.enter_context(Recorder(log, pilot))
-        for frame in itertools.chain(() if first is None else (first,), frames):
+        for frame in itertools.chain((first,), frames):
             if frame.image is not None and not found.pictures:
                 pilot.prepare(frame.image)
             command = recorder.step(frame)
@@ -93,9 +112,11 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
             safety[str(command.safety)] += 1
             if command.safety_reasons:
                 found.safety_reasons[str(command.safety)] = "; ".join(command.safety_reasons)
-            rejected.update({text.split(":")[0] for text in command.rejected})
-    begin_s = 1e-9 * (first_ns or 0)
-    found.phases = [(event.time_s - begin_s, event.name, event.reason) for event in pilot.status.events]
+            reasons = {text.split(":")[0]: text for text in command.rejected}
+            rejected.update(reasons.keys())
+            found.rejected_last |= reasons
+    found.phases = [(event.time_s, event.name, event.reason) for event in pilot.status.events]
+    found.end = pilot.painter.phase + (f", waits for {pilot.waits_for}" if pilot.waits_for else "")
     found.outcomes, found.safety, found.rejected = dict(outcomes), dict(safety), dict(rejected)
     found.left_out, found.differences = dict(bag.held.ignored), list(bag.differences)
     names = (bag.frame_ids.get(role, "") for role in ("color", "wrench"))
@@ -113,14 +134,18 @@ def bag_text(found: BagFlight) -> list[str]:
     """Lines for the terminal."""
     lines = [f"{found.frames} frames in {found.duration_s:.2f} s, {found.pictures} with a picture"]
     lines += [f"  {time_s:8.2f} s  {name}: {reason}" for time_s, name, reason in found.phases]
+    lines.append(f"at the end: {found.end}")
     lines.append("supervisor: " + ", ".join(f"{state} {count}" for state, count in found.safety.items()))
     lines += [f"  {state}: {reason}" for state, reason in found.safety_reasons.items()]
     lines.append("commands: " + ", ".join(f"{outcome} {count}" for outcome, count in found.outcomes.items()))
-    for title, counts in (("refused by the pilot", found.rejected), ("left out of the bag", found.left_out)):
+    refused = {found.rejected_last[head]: count for head, count in found.rejected.items()}
+    for title, counts in (("refused by the pilot", refused), ("left out of the bag", found.left_out)):
         reasons = sorted(counts.items(), key=lambda each: -each[1])
         lines.append(f"{title}: {'nothing' if not reasons else ''}".rstrip())
         lines += [f"  {count} times  {reason}" for reason, count in reasons[:MOST_REASONS]]
     lines += [f"tf_static: {name} = {position} from the base frame" for name, position in found.poses.items()]
+    if not found.poses:
+        lines.append("tf_static: places neither the camera nor the force sensor")
     return lines + [f"the bag: {each}" for each in found.differences]
 
 

@@ -73,7 +73,8 @@ class Vehicle:
         if config is not None:
             check = check_vehicle(config, self.push, found)
         if self.px4 is not None:
-            self.px4.write_text(to_px4(vehicle.geometry, vehicle.thrust_max.tolist()), encoding="utf-8")
+            parameters = to_px4(vehicle.geometry, vehicle.thrust_max.tolist())
+            self.px4.write_text(_remarks(given) + parameters, encoding="utf-8")
         if self.toml is not None:
             self.toml.write_text(vehicle_toml(given), encoding="utf-8")
         if self.mjcf is not None:
@@ -105,8 +106,14 @@ def read_vehicle(file: Path) -> VehicleFile:
     return read(chosen)
 
 
+def _remarks(given: VehicleFile) -> str:
+    """Assumptions of the source as comments."""
+    thrust = ("the greatest thrust is the Tarot T960's",) if "thrust_max_n" in given.assumed else ()
+    return "".join(f"# Assumed: {note}\n" for note in (*given.notes, *thrust))
+
+
 def vehicle_toml(given: VehicleFile) -> str:
-    """A file with [vehicle]; keys that its source lacks are comments."""
+    """A file with [vehicle]; keys that its source lacks, and other assumptions, are comments."""
     import tomli_w
 
     from ibvs_qp.config.settings import to_dict
@@ -114,9 +121,10 @@ def vehicle_toml(given: VehicleFile) -> str:
     table = to_dict(given.vehicle)
     stated = {name: value for name, value in table.items() if name in given.stated}
     assumed = {name: value for name, value in table.items() if name not in given.stated and name != "geometry"}
-    lines = [f"# {line}  # of the Tarot T960: {given.kind} does not state it" for line in _toml_lines(assumed)]
+    lines = [f"# {line}  # of the Tarot T960: not stated in {given.kind}" for line in _toml_lines(assumed)]
     geometry = stated.pop("geometry", None)
-    rotors = ["", tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
+    notes = "".join(f"# Assumed: {note}\n" for note in given.notes)
+    rotors = ["", notes + tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
     return "\n".join(["[vehicle]", *_toml_lines(stated), *lines, *rotors])
 
 
@@ -138,6 +146,7 @@ def _summary(given: VehicleFile, found: Actuation, config: PilotConfig | None, c
         "schema": 1,
         "kind": given.kind,
         "assumed": list(given.assumed),
+        "notes": list(given.notes),
         "problems": list(check.problems),
         "warnings": list(check.warnings),
         "force_sensor": None if config is None else _force_sensor(config),
@@ -238,7 +247,7 @@ def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | Non
     if config is not None:
         console.print(terminal_table(("setting", "value", "from"), derived_settings(config), text=("setting", "from")))
     if given.assumed:
-        console.print(f"Assumed, {given.kind} does not state it: {', '.join(given.assumed)}.")
+        console.print(f"Assumed, not stated in {given.kind}: {', '.join(given.assumed)}.")
     for note in given.notes:
         console.print(f"Assumed: {note}.")
 

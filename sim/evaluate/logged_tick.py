@@ -35,6 +35,8 @@ def logged_tick(file: Path, at_s: float) -> Trace:
     law = flown.controller if isinstance(flown, Assured) else flown
     if not isinstance(law, HybridController):
         raise IbvsQpError(f"{file} was not flown under the QP law, and has no program to explain")
+    if at_s < 0.0:
+        raise IbvsQpError(f"--at {at_s:g} s: the log begins at 0")
     events, kinds, begin_ns, found, phase = list[Event](), set[str](), None, None, ""
     for _, command in replayed(flight, flown):
         if command is None:
@@ -50,7 +52,7 @@ def logged_tick(file: Path, at_s: float) -> Trace:
         found, phase = _arrays(law, command, time_s), flight.phase
     if found is None:
         raise IbvsQpError(f"{file} has no tick of a controller up to its first gap")
-    if at_s < -0.5 * law.config.tick_s or at_s > float(found["t"][0]) + law.config.tick_s:
+    if at_s > float(found["t"][0]) + law.config.tick_s:
         raise IbvsQpError(f"--at {at_s:g} s: the log lasts from 0 to {float(found['t'][0]):.2f} s")
     return Trace(
         scene=Scene(), seed=0, law="qp", arrays=found, phases=(phase or "own loop",), outcomes=OUTCOMES, events=events,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import cv2
@@ -19,7 +20,7 @@ from sim.flight.preflight import check_job
 from sim.flight.trace import TIME_OUT, Trace
 from sim.gym_env.observation import observation_space, observe
 from sim.gym_env.reward import PaintReward, RewardSettings
-from sim.world.random_scene import TUNING, random_scene
+from sim.world.random_scene import EVALUATION, TUNING, random_scene
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, in_world
 
@@ -82,6 +83,14 @@ class PaintEnv(gymnasium.Env[Observation, np.ndarray]):
     ) -> None:
         if (action, law) not in LAWS:
             raise out_of_range("action, law", (action, law), "", f"allowed are {', '.join(map(str, LAWS))}")
+        choices = {"family": (family, (TUNING, EVALUATION)), "features": (features, ("geometric", "rendered"))}
+        for name, (value, allowed) in choices.items():
+            if value not in allowed:
+                raise out_of_range(name, value, "", f"allowed are {', '.join(allowed)}")
+        for name, number, unit in (("residual_n", residual_n, "N"), ("time_limit_s", time_limit_s, "s")):
+            if number is not None and not 0.0 < number < math.inf:
+                raise out_of_range(name, number, unit, "it must be above 0")
+        in_world(Scene(), world)  # refuses an unknown one
         self.render_mode, self._scene, self._limit_s = render_mode, scene, time_limit_s
         self._family, self._world, self._weights = family, world, reward or RewardSettings()
         controller = f"sim.gym_env.laws:{LAWS[action, law]}"
@@ -109,11 +118,18 @@ class PaintEnv(gymnasium.Env[Observation, np.ndarray]):
 
         Args:
             seed: Number of the scene, and seed of start, noise and errors; None draws one from `np_random`.
-            options: Not used.
+            options: None: the scene is that of the seed.
 
         Returns:
             The first observation, and info.
+
+        Raises:
+            ConfigError: With options.
         """
+        if options:
+            raise ConfigError(
+                f"reset has no options, got {', '.join(map(str, options))}: the seed is that of the scene"
+            )
         super().reset(seed=seed)
         self.close()
         number = int(self.np_random.integers(NUMBERS)) if seed is None else seed

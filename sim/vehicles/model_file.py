@@ -12,7 +12,7 @@ import xml.etree.ElementTree as ET  # nosec B405
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -34,6 +34,8 @@ _ROTOR = re.compile(r"rotor|prop", re.IGNORECASE)
 _ASSUMED_RATIO_M = 0.02
 #: A moment per thrust below this is none [m].
 _LEAST_RATIO_M = 1e-6
+#: Relative and absolute difference of a custom number from the model, by rounding: MuJoCo keeps cameras as floats.
+_ROUNDING = 1e-5, 1e-9
 #: Greatest moment that a site's force has about other axes, as a fraction of the moment [-].
 _BESIDE = 0.01
 
@@ -64,7 +66,9 @@ def read_model(file: Path) -> ModelVehicle:
 
     Axes are front-left-up, those of the first body. In MJCF a rotor is an actuator at a site whose gear is a force
     along the thrust axis and a moment, as in MuJoCo's own models of quadrotors; in URDF it is a joint whose link has
-    "rotor" or "prop" in its name, its axis that of the thrust, and "ccw" or "cw" in its name or a turn by azimuth.
+    "rotor" or "prop" in its name, its axis that of the thrust. Spin, moment and thrust are those of Gazebo's motor
+    plugin for the link; else the spin is "ccw" or "cw" in the link's name, or a turn by azimuth. Bodies beyond the
+    force sensor are the tool. Custom numbers ``vehicle.FIELD`` count where the model says nothing else.
 
     Args:
         file: The model.
@@ -131,10 +135,17 @@ def _vehicle(model: mujoco.MjModel, urdf: ET.Element | None) -> ModelVehicle:
     limits = [thrust.limits for thrust in thrusts if thrust.limits is not None]
     if len(limits) == len(thrusts):
         values["thrust_min_n"], values["thrust_max_n"] = (tuple(side) for side in zip(*limits, strict=True))
-    for field, pattern in (("tip_position_m", _TIP), ("force_torque_position_m", _SENSOR)):
-        if (place := _place(model, data, pattern)) is not None:
-            values[field] = tuple((to_body @ (place - centre)).tolist())
-    values |= _camera(model, data, centre, to_body) | _tool(model, data, centre, to_body) | _custom(model)
+    if (tip := _frame(model, data, _TIP)) is not None:
+        values["tip_position_m"] = tuple((to_body @ (tip.place - centre)).tolist())
+    if (sensor := _frame(model, data, _SENSOR)) is not None:
+        values["force_torque_position_m"] = tuple((to_body @ (sensor.place - centre)).tolist())
+        values["force_torque_turn_deg"] = _turn(to_body @ sensor.axes @ np.diag(FLIP))
+        values |= _tool(model, data, base, sensor, centre, to_body)
+    values |= _camera(model, data, centre, to_body)
+    custom = _custom(model)
+    differing = [name for name in custom if name in values and not np.allclose(custom[name], values[name], *_ROUNDING)]
+    values |= {name: value for name, value in custom.items() if name not in differing}
+    notes += tuple(f"{name} as modelled: the custom number vehicle.{name} is another one" for name in differing)
     kind = "MJCF" if urdf is None else "URDF"
     return ModelVehicle(vehicle=VehicleParams(**values), kind=kind, stated=frozenset(values), notes=notes)
 
@@ -168,23 +179,42 @@ def _urdf_rotors(model: mujoco.MjModel, data: mujoco.MjData, urdf: ET.Element) -
         own = np.array((axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split(), float)
         own /= max(float(np.linalg.norm(own)), 1e-12)
         turn = 1.0 if "ccw" in name.lower() else -1.0 if re.search(r"(^|_)cw(_|$)", name.lower()) else 0.0
-        ratio = turn * _ASSUMED_RATIO_M or None
-        yield _Thrust(
-            name=name, hub=data.xpos[body].copy(), axis=data.xmat[body].reshape(3, 3) @ own, ratio=ratio, limits=None
-        )
+        ratio, limits = turn * math.inf if turn else None, None
+        for plugin in urdf.iter("plugin"):
+            if name == (plugin.findtext("linkName") or "").strip():
+                ratio, limits = _plugin(plugin, ratio)
+        hub, axis = data.xpos[body].copy(), data.xmat[body].reshape(3, 3) @ own
+        yield _Thrust(name=name, hub=hub, axis=axis, ratio=ratio, limits=limits)
+
+
+def _plugin(plugin: ET.Element, ratio: float | None) -> tuple[float | None, tuple[float, float] | None]:
+    """Signed moment per thrust, infinite for a spin alone, and thrust limits by Gazebo's motor model."""
+
+    def number(name: str) -> float:
+        return float(plugin.findtext(name) or "nan")
+
+    turn = {"ccw": 1.0, "cw": -1.0}.get((plugin.findtext("turningDirection") or "").strip().lower())
+    moment, largest = abs(number("momentConstant")), number("motorConstant") * number("maxRotVelocity") ** 2
+    if turn is not None or ratio is not None:
+        turn = math.copysign(1.0, ratio or 1.0) if turn is None else turn
+        ratio = turn * (moment if math.isfinite(moment) else math.inf)
+    return ratio, (0.0, largest) if largest > 0.0 else None
 
 
 def _geometry(thrusts: list[_Thrust], centre: np.ndarray, to_body: np.ndarray) -> tuple[RotorGeometry, tuple[str, ...]]:
-    """Rotors in B; those without a moment turn in alternation by azimuth."""
+    """Rotors in B; those without a spin turn in alternation by azimuth."""
     hubs = [to_body @ (thrust.hub - centre) for thrust in thrusts]
     order = sorted(range(len(hubs)), key=lambda index: math.atan2(hubs[index][1], hubs[index][0]))
     alternate = {index: 1 if place % 2 == 0 else -1 for place, index in enumerate(order)}
-    rotors, open_ones = [], []
+    rotors, open_ones, without_moment = [], [], []
     for index, (thrust, hub) in enumerate(zip(thrusts, hubs, strict=True)):
-        known = thrust.ratio is not None and abs(thrust.ratio) > _LEAST_RATIO_M
-        ratio = thrust.ratio if known and thrust.ratio is not None else alternate[index] * _ASSUMED_RATIO_M
-        if not known:
+        ratio = 0.0 if thrust.ratio is None else thrust.ratio
+        if abs(ratio) <= _LEAST_RATIO_M:
+            ratio = alternate[index] * math.inf
             open_ones.append(thrust.name)
+        if math.isinf(ratio):
+            ratio = math.copysign(_ASSUMED_RATIO_M, ratio)
+            without_moment.append(thrust.name)
         axis = to_body @ thrust.axis
         rotors.append(
             Rotor(
@@ -195,26 +225,51 @@ def _geometry(thrusts: list[_Thrust], centre: np.ndarray, to_body: np.ndarray) -
                 torque_ratio_m=abs(ratio),
             )
         )
-    words = f"spin of {', '.join(open_ones)}: in turn by azimuth, with {_ASSUMED_RATIO_M:g} m of moment per thrust"
-    return RotorGeometry(rotors=tuple(rotors), torque_ratio_m=_ASSUMED_RATIO_M), (words,) if open_ones else ()
+    notes = (
+        (open_ones, "spin of {}: in turn by azimuth, one of two possibilities"),
+        (without_moment, f"moment per thrust of {{}}: {_ASSUMED_RATIO_M:g} m"),
+    )
+    words = tuple(text.format(", ".join(names)) for names, text in notes if names)
+    return RotorGeometry(rotors=tuple(rotors), torque_ratio_m=_ASSUMED_RATIO_M), words
 
 
-def _place(model: mujoco.MjModel, data: mujoco.MjData, pattern: re.Pattern[str]) -> np.ndarray | None:
-    """Place of the first site or body with such a name."""
-    for count, kind, places in ((model.nsite, model.site, data.site_xpos), (model.nbody, model.body, data.xpos)):
-        for index in range(count):
-            if pattern.search(kind(index).name):
-                return places[index].copy()
+class _Frame(NamedTuple):
+    """A site or body with a sensor's name."""
+
+    name: str
+    body: int
+    place: np.ndarray  # in world axes [m]
+    axes: np.ndarray  # its axes in world axes
+
+
+def _frame(model: mujoco.MjModel, data: mujoco.MjData, pattern: re.Pattern[str]) -> _Frame | None:
+    """The first site or body with such a name."""
+    for index in range(model.nsite):
+        if pattern.search(name := model.site(index).name):
+            axes = data.site_xmat[index].reshape(3, 3)
+            return _Frame(name, int(model.site_bodyid[index]), data.site_xpos[index].copy(), axes)
+    for index in range(model.nbody):
+        if pattern.search(name := model.body(index).name):
+            return _Frame(name, index, data.xpos[index].copy(), data.xmat[index].reshape(3, 3))
     return None
 
 
+def _turn(axes: np.ndarray) -> tuple[float, float, float]:
+    """Rotation vector of axes [deg], rounded to 1e-6."""
+    x, y, z = (np.degrees(Rotation.from_matrix(axes).as_rotvec()).round(6) + 0.0).tolist()
+    return x, y, z
+
+
 def _camera(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_body: np.ndarray) -> dict[str, Any]:
-    """Place, turn and intrinsics of the first camera of MJCF; the place of one in URDF."""
+    """Place, turn and intrinsics of the first camera of MJCF; place and turn of one in URDF, by ROS's axes."""
     if model.ncam == 0:
-        place = _place(model, data, _CAMERA)
-        return {} if place is None else {"camera_position_m": tuple((to_body @ (place - centre)).tolist())}
+        if (frame := _frame(model, data, _CAMERA)) is None:
+            return {}
+        optical, axes = "optical" in frame.name.lower(), to_body @ frame.axes
+        turn = _turn(axes @ R_BODY_CAMERA.T if optical else axes @ np.diag(FLIP))
+        return {"camera_position_m": tuple((to_body @ (frame.place - centre)).tolist()), "camera_turn_deg": turn}
     axes = to_body @ data.cam_xmat[0].reshape(3, 3) @ np.diag(FLIP)  # right, down, front in B
-    turn = np.degrees(Rotation.from_matrix(axes @ R_BODY_CAMERA.T).as_rotvec()).round(6) + 0.0
+    turn = _turn(axes @ R_BODY_CAMERA.T)
     (width, height), default = (int(entry) for entry in model.cam_resolution[0]), VehicleParams().camera_size_px
     if min(width, height) < 32:
         width, height = default
@@ -232,13 +287,13 @@ def _of_camera(
     data: mujoco.MjData,
     centre: np.ndarray,
     to_body: np.ndarray,
-    turn: np.ndarray,
+    turn: tuple[float, float, float],
     size: tuple[int, int],
     intrinsics: tuple[float, float, float, float],
 ) -> dict[str, Any]:
     return {
         "camera_position_m": tuple((to_body @ (data.cam_xpos[0] - centre)).tolist()),
-        "camera_turn_deg": tuple(turn.tolist()),
+        "camera_turn_deg": turn,
         "camera_size_px": size,
         "camera_intrinsics_px": intrinsics,
     }
@@ -255,10 +310,12 @@ def _custom(model: mujoco.MjModel) -> dict[str, Any]:
     return found
 
 
-def _tool(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_body: np.ndarray) -> dict[str, Any]:
-    """Mass and centre of mass of the body named tool."""
-    tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool")
-    if tool < 0 or model.body_mass[tool] <= 0.0:
+def _tool(
+    model: mujoco.MjModel, data: mujoco.MjData, base: int, sensor: _Frame, centre: np.ndarray, to_body: np.ndarray
+) -> dict[str, Any]:
+    """Mass and centre of mass of the bodies beyond the force sensor: its own and those on it, or the one named tool."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool") if sensor.body == base else sensor.body
+    if body < 0 or (mass := float(model.body_subtreemass[body])) <= 0.0:
         return {}
-    place = tuple((to_body @ (data.xipos[tool] - centre)).tolist())
-    return {"tool_mass_kg": float(model.body_mass[tool]), "tool_position_m": place}
+    place = to_body @ (data.subtree_com[body] - centre)
+    return {"tool_mass_kg": mass, "tool_position_m": tuple(place.tolist())}

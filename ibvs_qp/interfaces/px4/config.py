@@ -79,6 +79,8 @@ class BridgeConfig:
         validate(self)
         if self.namespace:
             check_name("namespace", self.namespace)
+        if not self.topics.color:
+            raise out_of_range("topics.color", self.topics.color, "", "the bridge needs pictures")
         if self.topics.attitude_filter_s > 0.0:
             words = "it must be 0 in flight: PX4 has an attitude, and the self-check compares it with the accelerometer"
             raise out_of_range("topics.attitude_filter_s", self.topics.attitude_filter_s, "s", words)

@@ -72,7 +72,8 @@ class Bag:
                 continue
             stamp = self.held.last["imu"].stamp_ns
             if last is not None and 0 <= stamp - last < least_ns:
-                continue  # faster than the tick
+                self.held.ignore("imu", "faster than the tick")
+                continue
             if (frame := self.held.frame(stamp)) is not None:
                 last = stamp
                 yield frame
@@ -97,11 +98,14 @@ class Bag:
         self.held, self.differences, self.frame_ids = LatestSamples(self.topics), [], {}
         self.poses = StaticPoses()
         with contextlib.closing(Recording(self.path)) as recording:
-            if any(each.topic == self.topics.color for each in recording.channels):
-                roles = (*roles, *camera)
+            color = self.topics.color
+            pictures = bool(camera and color) and any(each.topic == color for each in recording.channels)
+            # A colour topic that was named must be there; without the default one a bag has no pictures.
+            roles = (*roles, *camera) if pictures or (color and color != type(self.topics)().color) else roles
             names = self.topics.names(roles)
             for role, name in names.items():
                 self._check(recording, role, name)
+            unread = self._near(recording, "color") if camera and color and "color" not in names else []
             for message in recording.messages({*names.values(), TF_TOPIC}):
                 if message.channel.topic == TF_TOPIC and message.channel.type_name == TF:
                     with contextlib.suppress(Exception):
@@ -121,6 +125,10 @@ class Bag:
                         yield role
             self.held.finish()
             self.differences = recording.differences
+            if unread:
+                self.differences.append(
+                    f"no pictures: no topic {color} for color; of such a type are {', '.join(unread)}"
+                )
         for each in self.differences:
             warnings.warn(f"{self.path}: {each}", stacklevel=3)
 
@@ -129,11 +137,16 @@ class Bag:
         types = " or ".join(kind.replace("/msg/", "/") for kind in ACCEPTED[role])
         found = [each.type_name for each in recording.channels if each.topic == name]
         if not found:
-            near = sorted({each.topic for each in recording.channels if each.type_name in ACCEPTED[role]})
+            near = self._near(recording, role)
             hint = f"of such a type are {', '.join(near)}" if near else "no topic has such a type"
             raise ConfigError(f"{self.path}: no topic {name} for {role} ({types}); {hint}")
         if not set(found) & set(ACCEPTED[role]):
             raise ConfigError(f"{self.path}: topic {name} for {role} has type {shown(found[0])}, not {types}")
+
+    @staticmethod
+    def _near(recording: Recording, role: str) -> list[str]:
+        """Topics of a type that the role may have."""
+        return sorted({each.topic for each in recording.channels if each.type_name in ACCEPTED[role]})
 
 
 def sensor_frames(path: str | Path, topics: Topics | None = None) -> Iterator[SensorFrame]:

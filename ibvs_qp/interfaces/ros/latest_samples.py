@@ -78,7 +78,8 @@ class LatestSamples:
 
     def frame(self, stamp_ns: int) -> SensorFrame | None:
         """Frame of a tick, with a picture that no frame had; None until every sensor was received."""
-        if any(role not in self.last for role in MOTION):
+        if missing := [role for role in MOTION if role not in self.last]:
+            self.ignore("imu", f"no {' and no '.join(missing)} yet")
             return None
         values: dict[str, Any] = {}
         for sample in self.last.values():
@@ -86,7 +87,9 @@ class LatestSamples:
         return SensorFrame(stamp_ns=stamp_ns, image=self.take_picture(), **values)
 
     def finish(self) -> None:
-        """Count the pictures that still wait, at the end of a recording."""
+        """Count the pictures that still wait, for a partner or a frame, at the end of a recording."""
+        if self.take_picture() is not None:
+            self.ignore("color", "no frame came after it")
         for role, waiting in self._waiting.items():
             self._forget(role, len(waiting))
 

@@ -60,9 +60,9 @@ def attitude(value: Any) -> Sample:
     """Attitude of B in I of a ``px4_msgs/VehicleAttitude`` or ``sensor_msgs/Imu``."""
     if type_of(value) == VEHICLE_ATTITUDE:
         return Sample(from_px4(value.timestamp_sample), {"attitude": _unit(value.q)})
-    if value.orientation_covariance[0] == ABSENT:
+    ros = getattr(value, "orientation", None)  # SensorCombined has none
+    if ros is None or value.orientation_covariance[0] == ABSENT or not any((ros.w, ros.x, ros.y, ros.z)):
         raise BadMessage("has no orientation: name a topic as attitude, or set attitude_filter_s")
-    ros = value.orientation
     return Sample(from_ros(value.header.stamp), {"attitude": swap_attitude(_unit((ros.w, ros.x, ros.y, ros.z)))})
 
 

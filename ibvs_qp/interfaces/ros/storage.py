@@ -33,6 +33,8 @@ _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 #: Opcodes of MCAP records, sizes of a record's head and of a chunk's times.
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _STATISTICS = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0B
 _HEAD, _TIMES = struct.Struct("<BQ"), struct.Struct("<QQ")
+#: Bytes of a chunk before its content, with the longest name of a compression.
+_CHUNK_HEAD = 44
 
 
 class Channel(NamedTuple):
@@ -76,6 +78,7 @@ class McapStorage:
         #: Start and end of recording, place and size of every part that holds messages.
         self._parts: list[tuple[int, int, int, int, int]] = []
         self.profile, self.stated, self.damage, self.damages = "", Counter[str](), "", dict[int, str]()
+        self._cut = -1  # place of a chunk that the file ends in
         try:
             self._scan()
         except BaseException:
@@ -118,6 +121,10 @@ class McapStorage:
                 break
             if place > end:
                 self.damage = f"it ends within a record, at byte {end}"
+                if opcode == _CHUNK and end - start > _CHUNK_HEAD:
+                    times = _TIMES.unpack(self._stream.read(_TIMES.size))
+                    self._parts.append((*times, start, end - start, opcode))
+                    self._cut = start
                 break
             if opcode == 0:  # reserved room that a killed recorder did not fill
                 self.damage = f"it has no records from byte {start - _HEAD.size} on"
@@ -145,7 +152,7 @@ class McapStorage:
         data = self._stream.read(size)
         if opcode == _MESSAGE:
             return [_message(data)]
-        content, whole = _chunk(data)
+        content, whole = _chunk(data) if place != self._cut else (_cut_chunk(data), True)
         if not whole:
             self.damages[place] = f"the chunk at byte {place} is damaged and left out"
             return []
@@ -155,6 +162,8 @@ class McapStorage:
             place += _HEAD.size
             record = content[place : place + size]
             place += size
+            if place > len(content):
+                break
             if opcode == _MESSAGE:
                 found.append(_message(record))
             elif opcode in (_SCHEMA, _CHANNEL):
@@ -274,6 +283,22 @@ def _chunk(record: bytes) -> tuple[bytes, bool]:
         raise ValueError(f"compression {chunk.compression[:20]!r} is unknown")
     content = unpack(chunk.data, chunk.uncompressed_size)
     return content, chunk.uncompressed_crc in (0, zlib.crc32(content))
+
+
+def _cut_chunk(record: bytes) -> bytes:
+    """Content of a chunk up to the end of its file."""
+    name_size = int.from_bytes(record[28:32], "little")
+    name, data = record[32 : 32 + name_size].decode(), record[40 + name_size :]
+    if not name:
+        return data
+    from lz4.frame import LZ4FrameDecompressor
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    decompressor: Any = {"zstd": zstd.ZstdDecompressor, "lz4": LZ4FrameDecompressor}[name]()
+    try:
+        return decompressor.decompress(data, LARGEST_UNPACKED)
+    except Exception:  # cut within the first block
+        return b""
 
 
 def _zstd(data: bytes, size: int) -> bytes:

@@ -32,7 +32,7 @@ ACCEPTED = {
 CAMERA, MOTION = ("color", "depth", "camera_info"), ("imu", "attitude", "wrench")
 SAMPLES = tuple([role for role in ACCEPTED if role not in CAMERA])
 #: Topics without which a frame is complete, or whose quantity comes with another one: their names may be empty.
-OPTIONAL = ("attitude", *[role for role in SAMPLES if role not in MOTION])
+OPTIONAL = ("attitude", "color", *[role for role in SAMPLES if role not in MOTION])
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -58,7 +58,9 @@ class Topics:
     )
     wrench: str = setting("/ft_sensor/wrench", "force/torque sensor: geometry_msgs/WrenchStamped")
     height_rate: str = setting("", "rate of climb: geometry_msgs/TwistStamped, linear.z upwards; empty for none")
-    color: str = setting("/camera/camera/color/image_raw", "colour: Image of 8 bits per channel, or CompressedImage")
+    color: str = setting(
+        "/camera/camera/color/image_raw", "colour: Image of 8 bits per channel, or CompressedImage; empty for none"
+    )
     depth: str = setting(
         "/camera/camera/aligned_depth_to_color/image_raw",
         "depth, registered or not: Image in 16UC1 (mm) or 32FC1 (m), or compressedDepth",

@@ -25,7 +25,7 @@ def write_bag(
 
     Attitude, gyro and accelerometer are one ``sensor_msgs/Imu``, stamped by ``imu_stamp_ns``, or the tick. Other
     samples and pictures are written when they are new, one nanosecond before the tick that has them. Features are not
-    written.
+    written, nor pictures without a topic of colour.
 
     Args:
         frames: Of the flight, in order.
@@ -64,7 +64,7 @@ def write_bag(
                     if role in names and vector is not None and taken != last_ns.get(role):
                         last_ns[role] = taken
                         write(role, before, to_message(taken, vector, topics))
-                if (image := frame.image) is not None:
+                if (image := frame.image) is not None and topics.color:
                     info = pictures.from_intrinsics(image.intrinsics, image.rgb.shape, image.stamp_ns)
                     write("camera_info", before, info)
                     write("color", before, pictures.from_rgb(image.rgb, image.stamp_ns))

@@ -98,7 +98,7 @@ class Painter(Strategy):
         }.get(phase, 0.0)
 
     def _time_out(self, inputs: PainterInput) -> None:
-        reason = f"time-out after {inputs.time_s - self.entered:.0f} s in {self.phase}: {self._waits_for(inputs)}"
+        reason = f"time-out after {inputs.time_s - self.entered:.0f} s in {self.phase}: {self.waits_for(inputs)}"
         if self.phase == "retreat":
             self._end(inputs, reason, failed=True)
         else:
@@ -108,7 +108,7 @@ class Painter(Strategy):
         self.failed, self.reason = True, self.reason or reason
         self._enter(inputs, "retreat", reason)
 
-    def _waits_for(self, inputs: PainterInput) -> str:
+    def waits_for(self, inputs: PainterInput) -> str:
         """Condition for which the phase waits, with value and limit."""
         config, phase, (u, v) = self.config, self.phase, self._stroke.way
         if phase == "start":

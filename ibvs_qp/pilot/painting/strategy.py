@@ -62,6 +62,10 @@ class Strategy(ABC):
         self.finished = self.failed = self._leaving = self._abandoned = False
         self.reason = self.fault = ""
 
+    def waits_for(self, inputs: PainterInput) -> str:
+        """Condition for which the phase waits, in words; empty for none that is known."""
+        return ""
+
     @abstractmethod
     def step(self, inputs: PainterInput) -> PaintingCommand:
         """Targets of one tick.

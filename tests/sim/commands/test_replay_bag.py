@@ -13,23 +13,27 @@ pytest.importorskip("rosbags", reason="needs the extra ros")
 pytest.importorskip("mcap", reason="needs the extra log")
 
 from ibvs_qp import HybridController, LineFeature, LineReference, Measurement, Reference, RgbdFrame, SensorFrame
+from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.interfaces.log import Recorder
 from ibvs_qp.interfaces.ros.recording import is_bag
 from ibvs_qp.interfaces.ros.topics import ACCEPTED, Topics
 from ibvs_qp.interfaces.ros.write_bag import write_bag
+from ibvs_qp.pilot.config import CameraConfig, PilotConfig
 from sim.commands.cli import main
 
 TICK, TICKS = 4_000_000, 200
 TOOL_N = 0.35 * 9.81
+#: Begin of a bag by the system's clock [ns].
+EPOCH_NS = 1_763_000_000_000_000_000
 BAGS = Path(__file__).parents[3] / "docs" / "bags.md"
 
 
-def hover(ticks: int = TICKS) -> list[SensorFrame]:
+def hover(ticks: int = TICKS, begin_ns: int = 0) -> list[SensorFrame]:
     """At rest before a wall of one grey."""
     rng, frames = np.random.default_rng(0), []
     rgb, depth = np.full((60, 106, 3), 120, np.uint8), np.full((60, 106), 0.9, np.float32)
     for tick in range(1, ticks + 1):
-        stamp = tick * TICK
+        stamp = begin_ns + tick * TICK
         image = RgbdFrame(rgb=rgb, depth=depth, intrinsics=(78.0, 78.0, 52.5, 29.5), stamp_ns=stamp - 1)
         frames.append(
             SensorFrame(
@@ -49,7 +53,7 @@ def hover(ticks: int = TICKS) -> list[SensorFrame]:
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with a bag, whose IMU has a name of its own, and the run of its flight."""
     folder = tmp_path_factory.mktemp("bag")
-    write_bag(hover(), folder / "my bag", Topics(imu="/mavros/imu/data"))
+    write_bag(hover(begin_ns=EPOCH_NS), folder / "my bag", Topics(imu="/mavros/imu/data"))
     (folder / "topics.toml").write_text('imu = "/mavros/imu/data"\n')
     (folder / "bridge.toml").write_text('domain_id = 3\n[topics]\nimu = "/mavros/imu/data"\n')
     words = ["replay", str(folder / "my bag"), "--topics", str(folder / "topics.toml"), "--out", str(folder / "run")]
@@ -66,6 +70,8 @@ def test_a_bag_prints_phases_refusals_and_counts(flown: Path, capsys: pytest.Cap
     text = capsys.readouterr().out
     assert f"{TICKS} frames in 0.80 s, 4 with a picture" in text and "left out of the bag: nothing" in text
     assert f"Log: {flown / 'two' / 'bag.mcap'}" in text
+    assert "at the end: start, waits for wall" in text
+    assert main(["replay", str(flown / "my bag" / "metadata.yaml"), *words[2:-1], str(flown / "three")]) == 0
 
 
 def test_its_log_replays_and_explains(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -77,8 +83,34 @@ def test_its_log_replays_and_explains(flown: Path, capsys: pytest.CaptureFixture
     assert tick["t"] == pytest.approx(0.5, abs=0.002) and tick["phase"] != "own loop"
     np.testing.assert_allclose(tick["thrusts"], tick["flown_thrusts"], atol=0.05)
     assert {task["name"] for task in tick["tasks"]} >= {"roll", "pitch", "yaw"}
-    assert main(["explain", log, "--at", "2.0"]) == 2
-    assert "the log lasts from 0 to 0.80 s" in capsys.readouterr().err
+    assert main(["explain", str(flown / "run"), "--at", "0.5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == tick
+    for at, words in (("2.0", "the log lasts from 0 to 0.80 s"), ("-1", "the log begins at 0")):
+        assert main(["explain", log, "--at", at]) == 2
+        assert words in capsys.readouterr().err
+
+
+def test_a_bag_that_is_refused_in_flight_or_makes_no_frame_leaves_no_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_bag(hover(120)[1:], tmp_path / "bag")
+    preset = dump_toml(PilotConfig(camera=CameraConfig(distortion=(0.1, 0.0, 0.0, 0.0, 0.0))))
+    (tmp_path / "lens.toml").write_text(preset)
+    write_bag([dataclasses.replace(each, wrench=np.full(6, np.nan)) for each in hover(9)[1:]], tmp_path / "blind")
+    for words, text in (
+        (["bag", "--preset", "lens.toml"], "the lens of camera_info"),
+        (["blind"], "no frame can be made; left out: 8 times wrench: not finite"),
+    ):
+        places = [word if word.startswith("--") else str(tmp_path / word) for word in words]
+        assert main(["replay", *places, "--out", str(tmp_path / "run")]) == 2
+        assert text in capsys.readouterr().err and not (tmp_path / "run").exists()
+
+
+def test_phases_begin_at_the_first_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_bag(hover(1500, EPOCH_NS)[1:], tmp_path / "bag", Topics(color=""))
+    assert main(["replay", str(tmp_path / "bag"), "--out", str(tmp_path / "run"), "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["phases"] and all(0.0 <= begin_s < 6.0 for begin_s, _, _ in content["phases"])
 
 
 def test_the_log_of_an_own_loop_explains_the_tick_that_it_flew(

@@ -92,7 +92,7 @@ def test_what_a_file_does_not_state_is_marked(capsys: pytest.CaptureFixture[str]
     assert main(["vehicle", "t.params", "--toml", "t.toml"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert "6 kg (assumed), 6 rotors" in text
-    assert "Assumed, PX4 parameters does not state it: mass_kg, inertia_kg_m2" in text
+    assert "Assumed, not stated in PX4 parameters: mass_kg, inertia_kg_m2" in text
     found = summary(capsys, "t.toml")
     assert "mass_kg" in found["assumed"] and "geometry" not in found["assumed"]  # type: ignore[operator]
     assert found["push_n"] == pytest.approx(30.4, abs=0.1)

@@ -156,9 +156,15 @@ def test_an_action_that_is_not_finite_becomes_a_hold(options: dict[str, str]) ->
 
 
 def test_wrong_arguments_are_refused() -> None:
-    for options in ({"action": "wrench"}, {"law": "pid"}, {"scene": short_scene(stroke_m=0.2, rows=20)}):
+    wrong: list[dict[str, Any]] = [
+        {"action": "wrench"}, {"law": "pid"}, {"family": "x"}, {"world": "mars"}, {"features": "x"}, {"residual_n": -1.0},
+        {"time_limit_s": 0.0}, {"scene": short_scene(stroke_m=0.2, rows=20)},
+    ]  # fmt: skip
+    for options in wrong:
         with pytest.raises(ConfigError):
             made(**options)
+    with pytest.raises(ConfigError, match="no options, got scene"):
+        made().reset(seed=1, options={"scene": 3})
 
 
 def test_reward_of_a_perfect_tour_and_of_a_dab_elsewhere() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -22,6 +23,8 @@ from sim.vehicles.mjcf_export import vehicle_mjcf
 from sim.vehicles.vehicle_file import VehicleFile, read_vehicle
 
 T960 = VehicleParams()
+#: Entries of an inertia in URDF.
+AXES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def flu(vector: np.ndarray) -> str:
@@ -96,9 +99,53 @@ def test_a_model_of_the_tarot_is_the_tarot(make, tmp_path: Path) -> None:
         assert "thrust_max_n" in found.assumed
 
 
-def test_rotors_without_a_spin_are_noted(tmp_path: Path) -> None:
+def test_rotors_without_a_spin_or_a_moment_are_noted(tmp_path: Path) -> None:
     found = read(urdf().replace("_ccw", "").replace("_cw", ""), tmp_path)
-    assert "spin of rotor_0, rotor_1" in found.notes[0]
+    assert "spin of rotor_0, rotor_1" in found.notes[0] and "moment per thrust of rotor_0" in found.notes[1]
+    (moment,) = read(urdf(), tmp_path).notes
+    assert moment.startswith("moment per thrust of rotor_0_") and moment.endswith(": 0.02 m")
+
+
+def test_spin_moment_and_thrust_of_a_urdf_are_those_of_gazebos_motors(tmp_path: Path) -> None:
+    text = urdf().replace("_ccw", "").replace("_cw", "")
+    motors = "".join(
+        f"<gazebo><plugin><linkName>rotor_{index}</linkName><turningDirection>{'ccw' if spin > 0 else 'cw'}"
+        "</turningDirection><momentConstant>0.03</momentConstant><motorConstant>2e-5</motorConstant>"
+        "<maxRotVelocity>1000</maxRotVelocity></plugin></gazebo>"
+        for index, spin in enumerate(TAROT_T960.spins)
+    )
+    found = read(text.replace("</robot>", f"{motors}</robot>"), tmp_path)
+    np.testing.assert_array_equal(found.vehicle.geometry.spins, TAROT_T960.spins)
+    np.testing.assert_allclose(found.vehicle.geometry.torque_ratios, 0.03)
+    np.testing.assert_allclose(found.vehicle.thrust_max, 20.0)
+    assert not found.notes and "thrust_max_n" in found.stated
+
+
+def test_turned_sensors_and_the_tool_beyond_them_are_read(tmp_path: Path) -> None:
+    turned = dataclasses.replace(T960, camera_turn_deg=(0.0, -12.0, 3.0), force_torque_turn_deg=(0.0, 0.0, 90.0))
+    moments = " ".join(f'{name}="{value}"' for name, value in zip(AXES, (1e-4, 1e-4, 1e-4, 0, 0, 0), strict=True))
+    tool = f'<inertial><mass value="0.12"/><inertia {moments}/></inertial>'
+    links = "".join(
+        f'<link name="{name}">{inertial}</link><joint name="of_{name}" type="fixed">'
+        f'<origin xyz="0.3 0 0.1" rpy="{rpy}"/><parent link="{parent}"/><child link="{name}"/></joint>'
+        for name, parent, rpy, inertial in (
+            ("camera_link", "base", "0 0.1 0", ""),
+            ("force_torque", "base", "0 0 0.5", ""),
+            ("tool", "force_torque", "0 0 0", tool),
+        )
+    )
+    found = read(urdf().replace("</robot>", f"{links}</robot>"), tmp_path)
+    degrees = math.degrees(0.1)
+    np.testing.assert_allclose(found.vehicle.camera_turn_deg, (0.0, -degrees, 0.0), atol=1e-5)
+    np.testing.assert_allclose(found.vehicle.force_torque_turn_deg, (0.0, 0.0, -math.degrees(0.5)), atol=1e-5)
+    assert found.vehicle.tool_mass_kg == pytest.approx(0.12) and "tool_position_m" in found.stated
+    text = vehicle_mjcf(turned)
+    assert read(text, tmp_path).vehicle.force_torque_turn_deg == turned.force_torque_turn_deg
+    edited = re.sub(r'(name="vehicle.tool_mass_kg" data=)"[^"]*"', r'\1"0.8"', text)
+    edited = re.sub(r'(name="vehicle.force_torque_turn_deg" data=)"[^"]*"', r'\1"0 0 10"', edited)
+    again = read(edited, tmp_path)
+    assert again.vehicle.tool_mass_kg == pytest.approx(turned.tool_mass_kg) and len(again.notes) == 2
+    np.testing.assert_allclose(again.vehicle.force_torque_turn_deg, (0.0, 0.0, 90.0), atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,9 @@ def test_numbers_that_are_no_numbers_are_bad() -> None:
             samples.inertial(px4_imu([wrong, 0, 0]))
     value = imu()
     value.orientation.w = value.orientation.z = 0.0  # of a driver without orientation
+    with pytest.raises(BadMessage, match="name a topic as attitude"):
+        samples.attitude(value)
+    value.orientation.w = 0.5
     with pytest.raises(BadMessage, match="quaternion"):
         samples.attitude(value)
 

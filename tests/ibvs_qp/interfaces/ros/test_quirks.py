@@ -174,14 +174,15 @@ def test_counts_of_bags_with_all_quirks_are_those_of_the_formats_themselves(tmp_
         ignored = Counter[str]()
         for reason, count in found.held.ignored.items():
             ignored[reason.split(":")[0]] += count
-        # Every message of the IMU makes a frame, is counted, or comes before the first wrench.
-        begin = min(recorded for recorded, topic, _ in flight(np.random.default_rng(seed)) if topic == WRENCH_TOPIC)
-        early = [each for each in flight(np.random.default_rng(seed)) if each[1] == IMU_TOPIC and each[0] <= begin]
-        assert 0 <= true[IMU_TOPIC] - len(frames) - ignored["imu"] <= len(early), seed
+        # Every message of the IMU makes a frame or is counted. The library leaves a chunk out that its file ends in.
+        cut = any("ends within a record" in each for each in found.differences)
+        more = len(frames) + ignored["imu"] - true[IMU_TOPIC]
+        assert more == 0 or (cut and more > 0), seed
         read = Counter({topic: true[topic] for topic in (IMU_TOPIC, WRENCH_TOPIC)})
         for each in found.differences:
             if match := re.fullmatch(r"(\S+): .* states (\d+) messages, (\d+) were read", each):
-                assert int(match[3]) == read[match[1]] != int(match[2]), seed
+                assert int(match[3]) == read[match[1]] or (cut and int(match[3]) > read[match[1]]), seed
+                assert match[2] != match[3], seed
                 lost += 1
         shutil.rmtree(tmp_path / "bag")
     assert lost > BAGS // 50  # the generator's wrong counts and cut files are named

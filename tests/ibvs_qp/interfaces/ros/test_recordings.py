@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import sqlite3
 import time
@@ -10,19 +11,31 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
 from bag_files import COUNT, LEVEL, REST, TICK, Log, frames, imu, rest, wrench
+from mcap.reader import NonSeekingReader
 from mcap.writer import CompressionType, IndexType
 from ruamel.yaml import YAML
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.interfaces.ros import samples
 from ibvs_qp.interfaces.ros.bag import Bag
-from ibvs_qp.interfaces.ros.messages import IMU, SENSOR_COMBINED, VEHICLE_ATTITUDE, WRENCH, encoded, message, typestore
+from ibvs_qp.interfaces.ros.messages import (
+    COMPRESSED_IMAGE,
+    IMU,
+    SENSOR_COMBINED,
+    VEHICLE_ATTITUDE,
+    WRENCH,
+    encoded,
+    message,
+    typestore,
+)
 from ibvs_qp.interfaces.ros.topics import Topics
 from ibvs_qp.interfaces.ros.write_bag import write_bag
 from ibvs_qp.measurement import SensorFrame
@@ -274,3 +287,70 @@ def test_a_chunk_of_gigabytes_is_refused_before_it_is_read(tmp_path: Path) -> No
         stream.truncate(1 << 34)
     with pytest.raises(ConfigError, match=f"a part has {size} bytes"):
         list(Bag(path).sensor_frames())
+
+
+def in_cut_chunk(content: bytes, channel: int) -> int:
+    """Messages of a channel in the chunk that a file ends in, by its bytes alone; 0 for a whole last record."""
+    place = 8
+    while place + 9 <= len(content):
+        opcode, size = content[place], int.from_bytes(content[place + 1 : place + 9], "little")
+        place += 9
+        if place + size > len(content) and opcode == 6:
+            name = int.from_bytes(content[place + 28 : place + 32], "little")
+            records = content[place + 40 + name :]
+            if name:
+                kinds = {4: zstandard.ZstdDecompressor().decompressobj, 3: lz4.frame.LZ4FrameDecompressor}
+                records = kinds[name]().decompress(records)
+            found, place = 0, 0
+            while place + 9 <= len(records):
+                opcode, size = records[place], int.from_bytes(records[place + 1 : place + 9], "little")
+                place += 9 + size
+                found += opcode == 5 and place <= len(records) and records[place - size] == channel
+            return found
+        place += size
+    return 0
+
+
+@pytest.mark.parametrize("compression", list(CompressionType), ids=lambda each: each.name)
+def test_the_chunk_that_a_killed_recorder_ends_in_is_read_up_to_the_end(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    path, more = rest(tmp_path / "cut.mcap", count=2000, compression=compression, chunk_size=400_000), 0
+    content = path.read_bytes()
+    for end in np.linspace(0.2, 0.9, 8):
+        path.write_bytes(content[: int(end * len(content))])
+        with open(path, "rb") as stream, contextlib.suppress(Exception):
+            whole = 0
+            for _, channel, _ in NonSeekingReader(stream).iter_messages(log_time_order=False):
+                whole += channel.topic == "/imu/data"
+        extra = in_cut_chunk(path.read_bytes(), 2)
+        count, ignored, differences = frames(path)
+        assert count + sum(ignored.values()) == whole + extra and len(differences) == 1
+        more += extra
+    assert more > 200
+
+
+def test_every_message_before_the_first_frame_and_after_the_last_is_counted(tmp_path: Path) -> None:
+    log = Log(tmp_path / "late.mcap")
+    force, inertial = log.channel("/ft_sensor/wrench", WRENCH), log.channel("/imu/data", IMU)
+    for tick in range(1, COUNT + 1):
+        if tick > 30:
+            log.put(force, tick * TICK - 1, WRENCH, wrench(tick * TICK - 1))
+        log.put(inertial, tick * TICK, IMU, imu(tick * TICK))
+    log.close()
+    assert frames(tmp_path / "late.mcap") == (COUNT - 30, {"imu: no wrench yet": 30}, [])
+
+
+def test_a_topic_of_colour_that_is_absent_is_refused_or_named(tmp_path: Path) -> None:
+    log = Log(tmp_path / "one.mcap")
+    force, inertial = log.channel("/ft_sensor/wrench", WRENCH), log.channel("/imu/data", IMU)
+    log.channel("/camera/color/image_raw/compressed", COMPRESSED_IMAGE)
+    log.put(force, TICK - 1, WRENCH, wrench(TICK - 1))
+    log.put(inertial, TICK, IMU, imu(TICK))
+    log.close()
+    words = "of such a type are /camera/color/image_raw/compressed"
+    (said,) = frames(tmp_path / "one.mcap")[2]
+    assert said.startswith("no pictures: no topic /camera/camera/color/image_raw for color") and said.endswith(words)
+    with pytest.raises(ConfigError, match=f"no topic /camera/typo for color .*{words}"):
+        frames(tmp_path / "one.mcap", Topics(color="/camera/typo"))
+    assert frames(tmp_path / "one.mcap", Topics(color="")) == (1, {}, [])
