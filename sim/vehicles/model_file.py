@@ -68,7 +68,7 @@ def read_model(file: Path) -> ModelVehicle:
     along the thrust axis and a moment, as in MuJoCo's own models of quadrotors; in URDF it is a joint whose link has
     "rotor" or "prop" in its name, its axis that of the thrust. Spin, moment and thrust are those of Gazebo's motor
     plugin for the link; else the spin is "ccw" or "cw" in the link's name, or a turn by azimuth. Bodies beyond the
-    force sensor are the tool. Custom numbers ``vehicle.FIELD`` count where the model says nothing else.
+    force sensor are the tool. Custom numbers ``vehicle.FIELD`` count where the model states nothing else.
 
     Args:
         file: The model.

@@ -157,9 +157,11 @@ def test_an_action_that_is_not_finite_becomes_a_hold(options: dict[str, str]) ->
 
 def test_wrong_arguments_are_refused() -> None:
     wrong: list[dict[str, Any]] = [
-        {"action": "wrench"}, {"law": "pid"}, {"family": "x"}, {"world": "mars"}, {"features": "x"}, {"residual_n": -1.0},
-        {"time_limit_s": 0.0}, {"scene": short_scene(stroke_m=0.2, rows=20)},
-    ]  # fmt: skip
+        *({name: "x"} for name in ("action", "law", "family", "world", "features")),
+        {"residual_n": -1.0},
+        {"time_limit_s": 0.0},
+        {"scene": short_scene(stroke_m=0.2, rows=20)},
+    ]
     for options in wrong:
         with pytest.raises(ConfigError):
             made(**options)
