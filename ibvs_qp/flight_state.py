@@ -99,6 +99,10 @@ class Rebuilt:
         """Built from the same arguments, in the present state."""
         return copied, (self._make, self.state())
 
+    def __copy__(self) -> Self:
+        """As a deep copy: two pilots must not share a law in flight."""
+        return copy.deepcopy(self)
+
 
 def copied(make: Callable[[], Any], state: FlightState) -> Any:
     """A pilot or controller built anew, in a state."""

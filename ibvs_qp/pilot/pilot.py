@@ -19,7 +19,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.contact_state import ContactState
 from ibvs_qp.estimation.estimator import INERTIAL
 from ibvs_qp.estimation.turned_camera import straightened
-from ibvs_qp.flight_state import FlightState, copied, put_state, take_state
+from ibvs_qp.flight_state import FlightState, Rebuilt, copied, put_state, take_state
 from ibvs_qp.measurement import FeatureFrame, Measurement, Reference, RgbdFrame, SensorFrame
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.pilot.camera import CameraInput
@@ -67,7 +67,7 @@ class LawCall(NamedTuple):
     command: Command
 
 
-class Pilot:
+class Pilot(Rebuilt):
     """Vision, estimation, strategy and one of the two laws in a row; `step` needs no simulator.
 
     Attributes:
@@ -139,8 +139,10 @@ class Pilot:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are built anew and continue from the state; the observer stays with the original."""
-        arguments = self.config, self.painter, self._seen_as, self.controller
-        return copied, (functools.partial(type(self), *arguments), self.state())
+        make = self._make  # of a subclass with a constructor of its own
+        if type(self).__init__ is Pilot.__init__:
+            make = functools.partial(type(self), self.config, self.painter, self._seen_as, self.controller)
+        return copied, (make, self.state())
 
     def state(self) -> FlightState:
         """Everything that changes from tick to tick; `restore` of this or an equal pilot continues from it.
@@ -194,7 +196,7 @@ class Pilot:
     @property
     def waits_for(self) -> str:
         """Condition for which the strategy's phase waits; empty at its end, or for none that is known."""
-        return self.planning.waits_for(self.estimation)
+        return self.planning.waits_for(self.estimation, self.setpoints.push_reference)
 
     @property
     def painter(self) -> Strategy:

@@ -76,9 +76,14 @@ class Planning:
         attitude = rotors.target(contact, estimation.estimator.attitude, motion.state[0], dt)
         return dataclasses.replace(command, **attitude) if attitude else command
 
-    def waits_for(self, estimation: Estimation) -> str:
-        """Condition for which the strategy's phase waits; empty at its end, or where it names none."""
-        return "" if self.painter.finished else self.painter.waits_for(self._inputs(estimation, 0.0))
+    def waits_for(self, estimation: Estimation, push_reference: float) -> str:
+        """Condition for which the strategy's phase waits; empty at its end, in a descent, or where it names none."""
+        if self.painter.finished or self.painter.descending:
+            return ""
+        try:
+            return str(self.painter.waits_for(self._inputs(estimation, push_reference)))
+        except Exception as error:  # of a strategy of the user's
+            return f"an unknown condition ({type(error).__name__}: {error})"
 
     def _inputs(self, estimation: Estimation, push_reference: float) -> PainterInput:
         motion, contact = estimation.motion, estimation.contact.state

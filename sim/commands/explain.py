@@ -76,11 +76,10 @@ class Explain:
         from sim.flight.flight_log import load_run
         from sim.flight.unfinished import JOURNALS
 
-        log = self.run_dir / BAG_LOG if (self.run_dir / BAG_LOG).exists() else self.run_dir
-        if log.is_file():
+        if self._log.is_file():
             from sim.evaluate.logged_tick import logged_tick
 
-            return logged_tick(log, self.at)
+            return logged_tick(self._log, self.at)
         if not (self.run_dir / "log.npz").exists() and not any(self.run_dir.glob(f"{JOURNALS}*")):
             raise IbvsQpError(f"{self.run_dir} is no run folder: it has no log.npz; give the folder that paint wrote")
         trace = load_run(self.run_dir).get("qp")
@@ -94,9 +93,14 @@ class Explain:
             raise IbvsQpError(f"--seed {self.seed}: the run was flown with seed {trace.seed}")
         return trace
 
+    @property
+    def _log(self) -> Path:
+        """The MCAP log, where one is given by its name or by its run folder."""
+        return self.run_dir / BAG_LOG if (self.run_dir / BAG_LOG).exists() else self.run_dir
+
     def _tick(self, trace: Trace) -> int:
         first, last = float(trace.t[0]), float(trace.t[-1])
-        if len(trace.t) == 1:  # of a log
+        if self._log.is_file():
             return 0
         if not first - 1e-6 <= self.at <= last + 1e-6:
             raise IbvsQpError(f"--at {self.at:g} s: the flight lasts from {first:g} to {last:.2f} s")

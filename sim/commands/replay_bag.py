@@ -72,9 +72,11 @@ def fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagFl
     Raises:
         ConfigError: When the bag is refused or makes no frame; there is no log then.
     """
+    from ibvs_qp.config.errors import ConfigError
+
     try:
         return _fly_bag(path, topics, config, log)
-    except BaseException:
+    except ConfigError:
         log.unlink(missing_ok=True)
         raise
 

@@ -109,7 +109,7 @@ def read_vehicle(file: Path) -> VehicleFile:
 def _remarks(given: VehicleFile) -> str:
     """Assumptions of the source as comments."""
     thrust = ("the greatest thrust is the Tarot T960's",) if "thrust_max_n" in given.assumed else ()
-    return "".join(f"# Assumed: {note}\n" for note in (*given.notes, *thrust))
+    return "".join(f"# Assumed: {' '.join(note.split())}\n" for note in (*given.notes, *thrust))
 
 
 def vehicle_toml(given: VehicleFile) -> str:
@@ -123,7 +123,7 @@ def vehicle_toml(given: VehicleFile) -> str:
     assumed = {name: value for name, value in table.items() if name not in given.stated and name != "geometry"}
     lines = [f"# {line}  # of the Tarot T960: not stated in {given.kind}" for line in _toml_lines(assumed)]
     geometry = stated.pop("geometry", None)
-    notes = "".join(f"# Assumed: {note}\n" for note in given.notes)
+    notes = "".join(f"# Assumed: {' '.join(note.split())}\n" for note in given.notes)
     rotors = ["", notes + tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
     return "\n".join(["[vehicle]", *_toml_lines(stated), *lines, *rotors])
 
@@ -241,7 +241,7 @@ def _finite(value: float) -> float | None:
 
 def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | None) -> None:
     """Settings that follow from the vehicle, and the missing keys of the file."""
-    from sim.evaluate.table import terminal_table
+    from sim.evaluate.table import plain, terminal_table
     from sim.vehicles.configuration import derived_settings
 
     if config is not None:
@@ -249,7 +249,7 @@ def _show_origin(console: Console, given: VehicleFile, config: PilotConfig | Non
     if given.assumed:
         console.print(f"Assumed, not stated in {given.kind}: {', '.join(given.assumed)}.")
     for note in given.notes:
-        console.print(f"Assumed: {note}.")
+        console.print(f"Assumed: {plain(note)}.")
 
 
 def _force_sensor(config: PilotConfig) -> str:

@@ -35,7 +35,7 @@ def logged_tick(file: Path, at_s: float) -> Trace:
     law = flown.controller if isinstance(flown, Assured) else flown
     if not isinstance(law, HybridController):
         raise IbvsQpError(f"{file} was not flown under the QP law, and has no program to explain")
-    if at_s < 0.0:
+    if not at_s >= 0.0:
         raise IbvsQpError(f"--at {at_s:g} s: the log begins at 0")
     events, kinds, begin_ns, found, phase = list[Event](), set[str](), None, None, ""
     for _, command in replayed(flight, flown):

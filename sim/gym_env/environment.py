@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import numbers
 from typing import Any
 
 import cv2
@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 import ibvs_qp
-from ibvs_qp.config.errors import ConfigError, out_of_range
+from ibvs_qp.config.errors import ConfigError, out_of_range, shown
 from sim.evaluate.truth import Assessment
 from sim.flight.closed_loop import ClosedLoop
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
@@ -81,15 +81,21 @@ class PaintEnv(gymnasium.Env[Observation, np.ndarray]):
         reward: RewardSettings | None = None,
         render_mode: str | None = None,
     ) -> None:
-        if (action, law) not in LAWS:
+        if (str(action), str(law)) not in LAWS:
             raise out_of_range("action, law", (action, law), "", f"allowed are {', '.join(map(str, LAWS))}")
         choices = {"family": (family, (TUNING, EVALUATION)), "features": (features, ("geometric", "rendered"))}
         for name, (value, allowed) in choices.items():
             if value not in allowed:
                 raise out_of_range(name, value, "", f"allowed are {', '.join(allowed)}")
-        for name, number, unit in (("residual_n", residual_n, "N"), ("time_limit_s", time_limit_s, "s")):
-            if number is not None and not 0.0 < number < math.inf:
-                raise out_of_range(name, number, unit, "it must be above 0")
+        for name, number, unit, most in (
+            ("residual_n", residual_n, "N", 1e3),
+            ("time_limit_s", time_limit_s, "s", 1e6),
+        ):
+            if number is not None and not (isinstance(number, numbers.Real) and 0.0 < float(number) <= most):
+                raise out_of_range(name, number, unit, f"it must be above 0 and at most {most:g}")
+        for name, value, kind in (("scene", scene, Scene), ("reward", reward, RewardSettings)):
+            if value is not None and not isinstance(value, kind):
+                raise ConfigError(f"{name}: {shown(value)} is no {kind.__name__}")
         in_world(Scene(), world)  # refuses an unknown one
         self.render_mode, self._scene, self._limit_s = render_mode, scene, time_limit_s
         self._family, self._world, self._weights = family, world, reward or RewardSettings()

@@ -34,6 +34,8 @@ _ROTOR = re.compile(r"rotor|prop", re.IGNORECASE)
 _ASSUMED_RATIO_M = 0.02
 #: A moment per thrust below this is none [m].
 _LEAST_RATIO_M = 1e-6
+#: Entries of Gazebo's motor model.
+_MOTOR = ("turningDirection", "momentConstant", "motorConstant")
 #: Relative and absolute difference of a custom number from the model, by rounding: MuJoCo keeps cameras as floats.
 _ROUNDING = 1e-5, 1e-9
 #: Greatest moment that a site's force has about other axes, as a fraction of the moment [-].
@@ -52,13 +54,14 @@ class ModelVehicle:
 
 @dataclass(frozen=True, kw_only=True)
 class _Thrust:
-    """One rotor: hub and thrust axis in world axes, signed KM [m] or None, thrust limits [N] or None."""
+    """One rotor: hub and axis in world axes; spin, moment per thrust [m] and limits [N], None where not stated."""
 
     name: str
     hub: np.ndarray
     axis: np.ndarray
-    ratio: float | None
-    limits: tuple[float, float] | None
+    spin: float | None = None
+    moment: float | None = None
+    limits: tuple[float, float] | None = None
 
 
 def read_model(file: Path) -> ModelVehicle:
@@ -135,15 +138,15 @@ def _vehicle(model: mujoco.MjModel, urdf: ET.Element | None) -> ModelVehicle:
     limits = [thrust.limits for thrust in thrusts if thrust.limits is not None]
     if len(limits) == len(thrusts):
         values["thrust_min_n"], values["thrust_max_n"] = (tuple(side) for side in zip(*limits, strict=True))
-    if (tip := _frame(model, data, _TIP)) is not None:
+    if (tip := _frame(model, data, own, _TIP)) is not None:
         values["tip_position_m"] = tuple((to_body @ (tip.place - centre)).tolist())
-    if (sensor := _frame(model, data, _SENSOR)) is not None:
+    if (sensor := _frame(model, data, own, _SENSOR)) is not None:
         values["force_torque_position_m"] = tuple((to_body @ (sensor.place - centre)).tolist())
         values["force_torque_turn_deg"] = _turn(to_body @ sensor.axes @ np.diag(FLIP))
         values |= _tool(model, data, base, sensor, centre, to_body)
-    values |= _camera(model, data, centre, to_body)
+    values |= _camera(model, data, own, centre, to_body)
     custom = _custom(model)
-    differing = [name for name in custom if name in values and not np.allclose(custom[name], values[name], *_ROUNDING)]
+    differing = [name for name in custom if name in values and not _same(name, custom[name], values[name])]
     values |= {name: value for name, value in custom.items() if name not in differing}
     notes += tuple(f"{name} as modelled: the custom number vehicle.{name} is another one" for name in differing)
     kind = "MJCF" if urdf is None else "URDF"
@@ -159,15 +162,28 @@ def _mjcf_rotors(model: mujoco.MjModel, data: mujoco.MjData) -> Iterable[_Thrust
         site = int(model.actuator_trnid[index, 0])
         axes, axis = data.site_xmat[site].reshape(3, 3), gear[:3] / force
         ratio = -float(gear[3:] @ axis) / force
+        turns = abs(ratio) > _LEAST_RATIO_M
         scale, limits = force * float(model.actuator_gainprm[index, 0]), None
         if model.actuator_ctrllimited[index]:
             low, high = (scale * model.actuator_ctrlrange[index]).tolist()
             limits = max(low, 0.0), high
         name = model.actuator(index).name or f"rotor_{index}"
-        yield _Thrust(name=name, hub=data.site_xpos[site].copy(), axis=axes @ axis, ratio=ratio, limits=limits)
+        yield _Thrust(
+            name=_clean(name),
+            hub=data.site_xpos[site].copy(),
+            axis=axes @ axis,
+            spin=math.copysign(1.0, ratio) if turns else None,
+            moment=abs(ratio) if turns else None,
+            limits=limits,
+        )
 
 
 def _urdf_rotors(model: mujoco.MjModel, data: mujoco.MjData, urdf: ET.Element) -> Iterable[_Thrust]:
+    motors = {
+        (plugin.findtext("linkName") or "").strip(): plugin
+        for plugin in urdf.iter("plugin")
+        if any(plugin.find(entry) is not None for entry in _MOTOR)
+    }
     for joint in urdf.findall("joint"):
         child, axis = joint.find("child"), joint.find("axis")
         name = "" if child is None else child.get("link", "")
@@ -178,53 +194,56 @@ def _urdf_rotors(model: mujoco.MjModel, data: mujoco.MjData, urdf: ET.Element) -
             continue
         own = np.array((axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split(), float)
         own /= max(float(np.linalg.norm(own)), 1e-12)
-        turn = 1.0 if "ccw" in name.lower() else -1.0 if re.search(r"(^|_)cw(_|$)", name.lower()) else 0.0
-        ratio, limits = turn * math.inf if turn else None, None
-        for plugin in urdf.iter("plugin"):
-            if name == (plugin.findtext("linkName") or "").strip():
-                ratio, limits = _plugin(plugin, ratio)
+        turn = 1.0 if "ccw" in name.lower() else -1.0 if re.search(r"(^|_)cw(_|$)", name.lower()) else None
         hub, axis = data.xpos[body].copy(), data.xmat[body].reshape(3, 3) @ own
-        yield _Thrust(name=name, hub=hub, axis=axis, ratio=ratio, limits=limits)
+        thrust = _Thrust(name=_clean(name), hub=hub, axis=axis, spin=turn)
+        yield thrust if name not in motors else _with_motor(thrust, motors[name])
 
 
-def _plugin(plugin: ET.Element, ratio: float | None) -> tuple[float | None, tuple[float, float] | None]:
-    """Signed moment per thrust, infinite for a spin alone, and thrust limits by Gazebo's motor model."""
+def _with_motor(thrust: _Thrust, motor: ET.Element) -> _Thrust:
+    """A rotor with the entries of Gazebo's motor model."""
 
     def number(name: str) -> float:
-        return float(plugin.findtext(name) or "nan")
+        return float(motor.findtext(name) or "nan")
 
-    turn = {"ccw": 1.0, "cw": -1.0}.get((plugin.findtext("turningDirection") or "").strip().lower())
-    moment, largest = abs(number("momentConstant")), number("motorConstant") * number("maxRotVelocity") ** 2
-    if turn is not None or ratio is not None:
-        turn = math.copysign(1.0, ratio or 1.0) if turn is None else turn
-        ratio = turn * (moment if math.isfinite(moment) else math.inf)
-    return ratio, (0.0, largest) if largest > 0.0 else None
+    spin = {"ccw": 1.0, "cw": -1.0}.get((motor.findtext("turningDirection") or "").strip().lower(), thrust.spin)
+    moment, speed = abs(number("momentConstant")), number("maxRotVelocity")
+    largest = number("motorConstant") * speed * speed
+    return dataclasses.replace(
+        thrust,
+        spin=spin,
+        moment=moment if moment > _LEAST_RATIO_M else None,
+        limits=(0.0, largest) if largest > 0.0 else None,
+    )
+
+
+def _clean(name: str) -> str:
+    """A name in one line."""
+    return " ".join(name.split())
 
 
 def _geometry(thrusts: list[_Thrust], centre: np.ndarray, to_body: np.ndarray) -> tuple[RotorGeometry, tuple[str, ...]]:
     """Rotors in B; those without a spin turn in alternation by azimuth."""
     hubs = [to_body @ (thrust.hub - centre) for thrust in thrusts]
     order = sorted(range(len(hubs)), key=lambda index: math.atan2(hubs[index][1], hubs[index][0]))
-    alternate = {index: 1 if place % 2 == 0 else -1 for place, index in enumerate(order)}
-    rotors, open_ones, without_moment = [], [], []
+    alternate = {index: 1.0 if place % 2 == 0 else -1.0 for place, index in enumerate(order)}
+    agreement = sum(alternate[index] * (thrust.spin or 0.0) for index, thrust in enumerate(thrusts))
+    rotors = []
     for index, (thrust, hub) in enumerate(zip(thrusts, hubs, strict=True)):
-        ratio = 0.0 if thrust.ratio is None else thrust.ratio
-        if abs(ratio) <= _LEAST_RATIO_M:
-            ratio = alternate[index] * math.inf
-            open_ones.append(thrust.name)
-        if math.isinf(ratio):
-            ratio = math.copysign(_ASSUMED_RATIO_M, ratio)
-            without_moment.append(thrust.name)
+        spin = math.copysign(1.0, agreement) * alternate[index] if thrust.spin is None else thrust.spin
+        moment = _ASSUMED_RATIO_M if thrust.moment is None else thrust.moment
         axis = to_body @ thrust.axis
         rotors.append(
             Rotor(
                 name=thrust.name,
-                spin=1 if ratio > 0.0 else -1,
+                spin=1 if spin > 0.0 else -1,
                 position_m=(float(hub[0]), float(hub[1]), float(hub[2])),
                 axis=(float(axis[0]), float(axis[1]), float(axis[2])),
-                torque_ratio_m=abs(ratio),
+                torque_ratio_m=moment,
             )
         )
+    open_ones = [thrust.name for thrust in thrusts if thrust.spin is None]
+    without_moment = [thrust.name for thrust in thrusts if thrust.moment is None]
     notes = (
         (open_ones, "spin of {}: in turn by azimuth, one of two possibilities"),
         (without_moment, f"moment per thrust of {{}}: {_ASSUMED_RATIO_M:g} m"),
@@ -238,19 +257,19 @@ class _Frame(NamedTuple):
 
     name: str
     body: int
+    is_body: bool
     place: np.ndarray  # in world axes [m]
     axes: np.ndarray  # its axes in world axes
 
 
-def _frame(model: mujoco.MjModel, data: mujoco.MjData, pattern: re.Pattern[str]) -> _Frame | None:
-    """The first site or body with such a name."""
+def _frame(model: mujoco.MjModel, data: mujoco.MjData, own: list[int], pattern: re.Pattern[str]) -> _Frame | None:
+    """The first site or body of the vehicle with such a name."""
     for index in range(model.nsite):
-        if pattern.search(name := model.site(index).name):
-            axes = data.site_xmat[index].reshape(3, 3)
-            return _Frame(name, int(model.site_bodyid[index]), data.site_xpos[index].copy(), axes)
-    for index in range(model.nbody):
+        if pattern.search(name := model.site(index).name) and (body := int(model.site_bodyid[index])) in own:
+            return _Frame(name, body, False, data.site_xpos[index].copy(), data.site_xmat[index].reshape(3, 3))
+    for index in own:
         if pattern.search(name := model.body(index).name):
-            return _Frame(name, index, data.xpos[index].copy(), data.xmat[index].reshape(3, 3))
+            return _Frame(name, index, True, data.xpos[index].copy(), data.xmat[index].reshape(3, 3))
     return None
 
 
@@ -260,10 +279,12 @@ def _turn(axes: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _camera(model: mujoco.MjModel, data: mujoco.MjData, centre: np.ndarray, to_body: np.ndarray) -> dict[str, Any]:
+def _camera(
+    model: mujoco.MjModel, data: mujoco.MjData, own: list[int], centre: np.ndarray, to_body: np.ndarray
+) -> dict[str, Any]:
     """Place, turn and intrinsics of the first camera of MJCF; place and turn of one in URDF, by ROS's axes."""
     if model.ncam == 0:
-        if (frame := _frame(model, data, _CAMERA)) is None:
+        if (frame := _frame(model, data, own, _CAMERA)) is None:
             return {}
         optical, axes = "optical" in frame.name.lower(), to_body @ frame.axes
         turn = _turn(axes @ R_BODY_CAMERA.T if optical else axes @ np.diag(FLIP))
@@ -301,7 +322,7 @@ def _of_camera(
 
 def _custom(model: mujoco.MjModel) -> dict[str, Any]:
     """Fields that stand as custom numbers ``vehicle.FIELD``."""
-    fields, found = {field.name for field in dataclasses.fields(VehicleParams)}, {}
+    fields, found = {field.name for field in dataclasses.fields(VehicleParams) if field.name != "geometry"}, {}
     for index in range(model.nnumeric):
         name = model.numeric(index).name.removeprefix("vehicle.")
         if name in fields and model.numeric(index).name != name:
@@ -310,12 +331,28 @@ def _custom(model: mujoco.MjModel) -> dict[str, Any]:
     return found
 
 
+def _same(name: str, one: Any, other: Any) -> bool:
+    """Whether two values of a field are equal up to rounding; rotation vectors as rotations."""
+    a, b = np.atleast_1d(np.array(one, float)), np.atleast_1d(np.array(other, float))
+    if a.shape != b.shape or not np.isfinite(a).all():
+        return False
+    if name.endswith("turn_deg"):
+        a, b = (Rotation.from_rotvec(each, degrees=True).as_matrix() for each in (a, b))
+    return np.allclose(a, b, *_ROUNDING)
+
+
 def _tool(
     model: mujoco.MjModel, data: mujoco.MjData, base: int, sensor: _Frame, centre: np.ndarray, to_body: np.ndarray
 ) -> dict[str, Any]:
-    """Mass and centre of mass of the bodies beyond the force sensor: its own and those on it, or the one named tool."""
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool") if sensor.body == base else sensor.body
-    if body < 0 or (mass := float(model.body_subtreemass[body])) <= 0.0:
+    """Mass and centre of mass of the bodies beyond the force sensor, or of the one named tool where there are none."""
+    body, without = sensor.body, sensor.is_body
+    if body == base or (without and model.body_subtreemass[body] <= model.body_mass[body]):
+        body, without = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool"), False
+    if body < 0:
         return {}
-    place = to_body @ (data.subtree_com[body] - centre)
-    return {"tool_mass_kg": mass, "tool_position_m": tuple(place.tolist())}
+    own = float(model.body_mass[body]) if without else 0.0
+    mass, moment = float(model.body_subtreemass[body]), model.body_subtreemass[body] * data.subtree_com[body]
+    if mass - own <= 0.0:
+        return {}
+    place = to_body @ ((moment - own * data.xipos[body]) / (mass - own) - centre)
+    return {"tool_mass_kg": mass - own, "tool_position_m": tuple(place.tolist())}

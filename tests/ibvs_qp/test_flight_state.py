@@ -223,7 +223,7 @@ def test_what_cannot_continue_is_refused_and_changes_nothing() -> None:
         assert pickle.dumps(flown.state().values["" if isinstance(flown, Pilot) else "gate"]) == before, name
 
 
-@pytest.mark.parametrize("copy_of", [copy.deepcopy, lambda flown: pickle.loads(pickle.dumps(flown))])
+@pytest.mark.parametrize("copy_of", [copy.copy, copy.deepcopy, lambda flown: pickle.loads(pickle.dumps(flown))])
 @pytest.mark.parametrize("kind", ["program", "analytic", "own row", "assured", "pilot"])
 def test_copies_and_pickles_continue(kind: str, copy_of: Callable[[Any], Any]) -> None:
     """As for a process that is spawned: from its construction and in flight."""
@@ -250,7 +250,16 @@ class OwnConstructor(HybridController):
         self.gain = gain
 
 
+class OwnPilot(Pilot):
+    """A pilot of a user's with a name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.name = name
+
+
 def test_a_subclass_with_its_own_constructor_is_copied() -> None:
+    assert [each.name for each in (copy.copy(OwnPilot("one")), copy.deepcopy(OwnPilot("one")))] == ["one", "one"]
     config = CASES["rotor_loss"].config().controller
     flown = OwnConstructor(0.5, config=config)
     for other in (copy.deepcopy(flown), pickle.loads(pickle.dumps(flown))):

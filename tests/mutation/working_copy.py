@@ -105,7 +105,9 @@ class WorkingCopy:
             os.chdir(self._folder)
             sys.dont_write_bytecode = True  # that of a mutant would outlive it
             changes = {"PYTHONPATH": str(self._folder), "IBVS_QP_CACHE": str(self._machine_code)}
-            os.environ.update(changes, PYTHONDONTWRITEBYTECODE="1")
+            # The conftest of the copy leaves bytecode alone where a folder is set, though it is none.
+            os.environ.update(changes, PYTHONDONTWRITEBYTECODE="1", PYTHONPYCACHEPREFIX="")
+            sys.pycache_prefix = None
             sys.path[:] = [str(self._folder), *(path for path in sys.path if Path(path).resolve() != ROOT)]
             for name in [each for each in sys.modules if each.partition(".")[0] in COPIED]:
                 del sys.modules[name]

@@ -33,6 +33,8 @@ _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 #: Opcodes of MCAP records, sizes of a record's head and of a chunk's times.
 _HEADER, _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _STATISTICS = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x0B
 _HEAD, _TIMES = struct.Struct("<BQ"), struct.Struct("<QQ")
+#: Memory of a waiting message beside its data [bytes].
+_MESSAGE_BYTES = 300
 #: Bytes of a chunk before its content, with the longest name of a compression.
 _CHUNK_HEAD = 44
 
@@ -97,13 +99,13 @@ class McapStorage:
         for start, _, place, size, opcode in sorted(self._parts):
             while waiting and waiting[0][0] < start:
                 message = heapq.heappop(waiting)[3]
-                held -= len(message.data)
+                held -= len(message.data) + _MESSAGE_BYTES
                 yield message
             for number, (channel_id, time_ns, data) in enumerate(self._messages(place, size, opcode)):
                 channel = self._channels.get(channel_id)
                 if channel is not None and channel.topic in topics:
                     heapq.heappush(waiting, (time_ns, place, number, Recorded(time_ns, channel, data)))
-                    held += len(data)
+                    held += len(data) + _MESSAGE_BYTES
             if held > LARGEST_HELD:
                 raise ValueError(f"its chunks overlap in time by more than {LARGEST_HELD} bytes")
         while waiting:
@@ -121,7 +123,7 @@ class McapStorage:
                 break
             if place > end:
                 self.damage = f"it ends within a record, at byte {end}"
-                if opcode == _CHUNK and end - start > _CHUNK_HEAD:
+                if opcode == _CHUNK and _CHUNK_HEAD < end - start <= LARGEST_UNPACKED:
                     times = _TIMES.unpack(self._stream.read(_TIMES.size))
                     self._parts.append((*times, start, end - start, opcode))
                     self._cut = start
@@ -152,23 +154,32 @@ class McapStorage:
         data = self._stream.read(size)
         if opcode == _MESSAGE:
             return [_message(data)]
-        content, whole = _chunk(data) if place != self._cut else (_cut_chunk(data), True)
+        found: list[tuple[int, int, bytes]] = []
+        if place == self._cut:
+            with contextlib.suppress(Exception):  # the file ends here: the messages before count
+                self._records(_cut_chunk(data), found)
+            return found
+        content, whole = _chunk(data)
         if not whole:
             self.damages[place] = f"the chunk at byte {place} is damaged and left out"
             return []
-        found, place = [], 0
+        self._records(content, found)
+        return found
+
+    def _records(self, content: bytes, found: list[tuple[int, int, bytes]]) -> None:
+        """Append the messages of a chunk's content, and take its schemas and channels."""
+        place = 0
         while place + _HEAD.size <= len(content):
             opcode, size = _HEAD.unpack_from(content, place)
             place += _HEAD.size
             record = content[place : place + size]
             place += size
-            if place > len(content):
+            if place > len(content) or opcode == 0:
                 break
             if opcode == _MESSAGE:
                 found.append(_message(record))
             elif opcode in (_SCHEMA, _CHANNEL):
                 self._define(opcode, record, {})
-        return found
 
     def _define(self, opcode: int, record: bytes, counts: dict[int, int]) -> None:
         from mcap import records

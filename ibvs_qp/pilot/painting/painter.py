@@ -130,7 +130,9 @@ class Painter(Strategy):
             return f"push {inputs.push:.2f} N, commanded {inputs.push_reference:.2f} N, limit {within:.2f} N"
         if phase == "climb":
             return f"place {v * 1e3:+.0f} mm, limit {config.climb_error_m * 1e3:g} mm"
-        return f"distance {inputs.distance:.2f} m, goal {config.retreat_m:g} m"
+        if phase == "retreat":
+            return f"distance {inputs.distance:.2f} m, goal {config.retreat_m:g} m"
+        return f"the end of the {phase}, {self._tip.along.u:.2f} m along the stroke"
 
     def _start(self, inputs: PainterInput, dt: float) -> PaintingCommand:
         """Wait for wall, tare and guide; step back for a wider view while no guide is in sight."""

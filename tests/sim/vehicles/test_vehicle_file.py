@@ -114,11 +114,17 @@ def test_spin_moment_and_thrust_of_a_urdf_are_those_of_gazebos_motors(tmp_path: 
         "<maxRotVelocity>1000</maxRotVelocity></plugin></gazebo>"
         for index, spin in enumerate(TAROT_T960.spins)
     )
+    motors += "<gazebo><plugin><linkName>rotor_0</linkName><topic>wind</topic></plugin></gazebo>"
     found = read(text.replace("</robot>", f"{motors}</robot>"), tmp_path)
     np.testing.assert_array_equal(found.vehicle.geometry.spins, TAROT_T960.spins)
     np.testing.assert_allclose(found.vehicle.geometry.torque_ratios, 0.03)
     np.testing.assert_allclose(found.vehicle.thrust_max, 20.0)
     assert not found.notes and "thrust_max_n" in found.stated
+    some = read(text.replace("</robot>", f"{motors.split('</gazebo>')[1]}</gazebo></robot>"), tmp_path)
+    np.testing.assert_array_equal(some.vehicle.geometry.spins, TAROT_T960.spins)  # in turn with the one that is stated
+    hostile = motors.replace("1000<", "1e200<")
+    with pytest.raises(ConfigError, match="thrust_max_n"):
+        read(text.replace("</robot>", f"{hostile}</robot>"), tmp_path)
 
 
 def test_turned_sensors_and_the_tool_beyond_them_are_read(tmp_path: Path) -> None:
@@ -139,6 +145,9 @@ def test_turned_sensors_and_the_tool_beyond_them_are_read(tmp_path: Path) -> Non
     np.testing.assert_allclose(found.vehicle.camera_turn_deg, (0.0, -degrees, 0.0), atol=1e-5)
     np.testing.assert_allclose(found.vehicle.force_torque_turn_deg, (0.0, 0.0, -math.degrees(0.5)), atol=1e-5)
     assert found.vehicle.tool_mass_kg == pytest.approx(0.12) and "tool_position_m" in found.stated
+    over = dataclasses.replace(T960, force_torque_turn_deg=(120.0, 120.0, 120.0))
+    back = read(vehicle_mjcf(over), tmp_path)
+    assert back.vehicle.force_torque_turn_deg == (120.0, 120.0, 120.0) and not back.notes
     text = vehicle_mjcf(turned)
     assert read(text, tmp_path).vehicle.force_torque_turn_deg == turned.force_torque_turn_deg
     edited = re.sub(r'(name="vehicle.tool_mass_kg" data=)"[^"]*"', r'\1"0.8"', text)

@@ -36,6 +36,7 @@ from ibvs_qp.interfaces.ros.messages import (
     message,
     typestore,
 )
+from ibvs_qp.interfaces.ros.recording import is_bag
 from ibvs_qp.interfaces.ros.topics import Topics
 from ibvs_qp.interfaces.ros.write_bag import write_bag
 from ibvs_qp.measurement import SensorFrame
@@ -354,3 +355,22 @@ def test_a_topic_of_colour_that_is_absent_is_refused_or_named(tmp_path: Path) ->
     with pytest.raises(ConfigError, match=f"no topic /camera/typo for color .*{words}"):
         frames(tmp_path / "one.mcap", Topics(color="/camera/typo"))
     assert frames(tmp_path / "one.mcap", Topics(color="")) == (1, {}, [])
+
+
+def test_a_damaged_head_of_the_last_chunk_costs_no_other_message(tmp_path: Path) -> None:
+    path = rest(tmp_path / "cut.mcap", count=2000, chunk_size=40_000)
+    content = path.read_bytes()
+    place, start = 8, 0
+    while content[place] != 15:  # the end of the data
+        start = place if content[place] == 6 else start
+        place += 9 + int.from_bytes(content[place + 1 : place + 9], "little")
+    cut = bytearray(content[: start + 5000])
+    path.write_bytes(bytes(cut))
+    whole = frames(path)[0]
+    cut[start + 37 : start + 41] = (4).to_bytes(4, "little")  # a compression of four letters that is none
+    path.write_bytes(bytes(cut))
+    count, _, (damage,) = frames(path)
+    assert 0 < count < whole and "ends within a record" in damage and is_bag(path)
+    cut[start + 1 : start + 9] = (1 << 40).to_bytes(8, "little")
+    path.write_bytes(bytes(cut))
+    assert frames(path)[0] == count
