@@ -20,7 +20,7 @@ RATE, LATE_MS, SILENT_MS = 250.0, 1e3 * SafetySettings().imu_age_s, 1e3 * Bridge
 #: and one flight in four paints one of them again [s]; distance of the tip after the retreat [m].
 PAINTED_S, AWAY_M = 130.0, 0.3
 #: Packets of garbage a tick.
-PACKETS = 5
+PACKETS = 8
 
 
 @pytest.fixture(scope="module", autouse=True)
