@@ -1,8 +1,5 @@
 /* Estimation and controller on any system with a C compiler: a vehicle hovers 0.3 m before a wall with a level edge.
  *
- * Picture and sensors below are made up for the Tarot T960. With another vehicle they do not fit its thrusts, and the
- * commands run away from a hover.
- *
  * read_sensors and read_features are the vehicle's; in a real loop a timer starts every tick, as in example_posix.c. */
 #include <stdio.h>
 
