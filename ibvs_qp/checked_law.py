@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -34,7 +34,7 @@ class Inputs(NamedTuple):
     rejected: tuple[str, ...]  # refused inputs, with the reason
 
 
-class CheckedLaw(Rebuilt, ABC):
+class CheckedLaw(Rebuilt):
     """Checks its inputs and never raises; a subclass is the law.
 
     Attributes:

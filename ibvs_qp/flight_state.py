@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Self
@@ -77,7 +78,7 @@ def put_state(root: Any, config: Any, state: FlightState) -> None:
             vars(part).update(values)
 
 
-class Rebuilt:
+class Rebuilt(ABC):
     """An object with `state` and `restore` whose copies and pickles are built anew from its constructor's arguments.
 
     The arguments are those of the outermost class, so a subclass with its own constructor is copied as well.
@@ -91,9 +92,9 @@ class Rebuilt:
         made._make = functools.partial(cls, *arguments, **named)
         return made
 
+    @abstractmethod
     def state(self) -> FlightState:
         """Everything that changes from step to step."""
-        raise NotImplementedError
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Built from the same arguments, in the present state."""

@@ -11,6 +11,7 @@ import tyro
 
 from ibvs_qp.config.errors import IbvsQpError
 from sim.commands.options import flag, optional
+from sim.commands.replay_bag import BAG_LOG
 
 if TYPE_CHECKING:
     from ibvs_qp.pilot import PilotConfig
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from sim.flight.trace import Trace
 
 
-#: Log in a run folder of ``replay BAG``.
-BAG_LOG = "bag.mcap"
 #: Arrays of the log that the explanation prints.
 _NEEDED = (
     "phase", "outcome", "push_measured", "push_reference", "reach_margin", "contact_weight", "iterations", "thrusts",

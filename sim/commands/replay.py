@@ -58,7 +58,7 @@ class ReplayCommand:
         from rich.console import Console
 
         from ibvs_qp.pilot import PilotConfig
-        from sim.commands.replay_bag import bag_text, fly_bag, read_topics, summary
+        from sim.commands.replay_bag import BAG_LOG, bag_text, fly_bag, read_topics, summary
         from sim.flight.working import working
         from sim.report.rundir import RunFolder, as_json, write_json
         from sim.vehicles.configuration import with_vehicle
@@ -72,7 +72,7 @@ class ReplayCommand:
         if vehicle is not None:
             config = with_vehicle(config, read_vehicle(vehicle).vehicle)
         with RunFolder.open(self.out) as folder:
-            log = folder.path / "bag.mcap"
+            log = folder.path / BAG_LOG
             with working(Console(stderr=True, quiet=self.json), "Flying the bag ..."):
                 found = fly_bag(self.log, topics, config, log)
             content = summary(self.log, log, found)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ibvs_qp.interfaces.ros.topics import Topics
     from ibvs_qp.pilot import PilotConfig
 
+#: Log in the run folder of a bag.
+BAG_LOG = "bag.mcap"
 #: Reasons of refused inputs that are printed; the JSON line has all.
 MOST_REASONS = 12
 
@@ -118,7 +120,7 @@ def _fly_bag(path: Path, topics: Topics, config: PilotConfig, log: Path) -> BagF
             rejected.update(reasons.keys())
             found.rejected_last |= reasons
     found.phases = [(event.time_s, event.name, event.reason) for event in pilot.status.events]
-    found.end = pilot.painter.phase + (f", waits for {pilot.waits_for}" if pilot.waits_for else "")
+    found.end = pilot.painter.phase + (f", waits for {condition}" if (condition := pilot.waits_for) else "")
     found.outcomes, found.safety, found.rejected = dict(outcomes), dict(safety), dict(rejected)
     found.left_out, found.differences = dict(bag.held.ignored), list(bag.differences)
     names = (bag.frame_ids.get(role, "") for role in ("color", "wrench"))

@@ -74,7 +74,8 @@ class Vehicle:
             check = check_vehicle(config, self.push, found)
         if self.px4 is not None:
             parameters = to_px4(vehicle.geometry, vehicle.thrust_max.tolist())
-            self.px4.write_text(_remarks(given) + parameters, encoding="utf-8")
+            thrust = ("the greatest thrust is the Tarot T960's",) if "thrust_max_n" in given.assumed else ()
+            self.px4.write_text(_remarks((*given.notes, *thrust)) + parameters, encoding="utf-8")
         if self.toml is not None:
             self.toml.write_text(vehicle_toml(given), encoding="utf-8")
         if self.mjcf is not None:
@@ -106,10 +107,9 @@ def read_vehicle(file: Path) -> VehicleFile:
     return read(chosen)
 
 
-def _remarks(given: VehicleFile) -> str:
-    """Assumptions of the source as comments."""
-    thrust = ("the greatest thrust is the Tarot T960's",) if "thrust_max_n" in given.assumed else ()
-    return "".join(f"# Assumed: {' '.join(note.split())}\n" for note in (*given.notes, *thrust))
+def _remarks(notes: tuple[str, ...]) -> str:
+    """Assumptions as comments of a line each."""
+    return "".join(f"# Assumed: {' '.join(note.split())}\n" for note in notes)
 
 
 def vehicle_toml(given: VehicleFile) -> str:
@@ -123,8 +123,7 @@ def vehicle_toml(given: VehicleFile) -> str:
     assumed = {name: value for name, value in table.items() if name not in given.stated and name != "geometry"}
     lines = [f"# {line}  # of the Tarot T960: not stated in {given.kind}" for line in _toml_lines(assumed)]
     geometry = stated.pop("geometry", None)
-    notes = "".join(f"# Assumed: {' '.join(note.split())}\n" for note in given.notes)
-    rotors = ["", notes + tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
+    rotors = ["", _remarks(given.notes) + tomli_w.dumps({"vehicle": {"geometry": geometry}})] if geometry else [""]
     return "\n".join(["[vehicle]", *_toml_lines(stated), *lines, *rotors])
 
 

@@ -38,8 +38,6 @@ _LEAST_RATIO_M = 1e-6
 _MOTOR = ("turningDirection", "momentConstant", "motorConstant")
 #: Relative and absolute difference of a custom number from the model, by rounding: MuJoCo keeps cameras as floats.
 _ROUNDING = 1e-5, 1e-9
-#: Greatest moment that a site's force has about other axes, as a fraction of the moment [-].
-_BESIDE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)

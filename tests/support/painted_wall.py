@@ -283,7 +283,7 @@ class PaintedWall:
         touching = self.time - self.contact_since if self.in_contact else 0.0
         if self.noise and round(self.time / TICK) % 3 == 0:
             self._noise = {k: self.noise * self._rng.standard_normal() for k in (1, 2, 3, 4, *range(101, 125), 201)}
-        inputs = PainterInput(
+        inputs = self.inputs = PainterInput(
             time_s=self.time,
             lines=self.lines(),
             odometer=self.odometer.tolist(),

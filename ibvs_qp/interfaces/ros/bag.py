@@ -99,9 +99,10 @@ class Bag:
         self.poses = StaticPoses()
         with contextlib.closing(Recording(self.path)) as recording:
             color = self.topics.color
-            pictures = bool(camera and color) and any(each.topic == color for each in recording.channels)
             # A colour topic that was named must be there; without the default one a bag has no pictures.
-            roles = (*roles, *camera) if pictures or (color and color != type(self.topics)().color) else roles
+            named = color != type(self.topics)().color
+            if color and (named or any(each.topic == color for each in recording.channels)):
+                roles = (*roles, *camera)
             names = self.topics.names(roles)
             for role, name in names.items():
                 self._check(recording, role, name)

@@ -97,10 +97,27 @@ def test_press_waits_for_the_push() -> None:
     assert world.painter.phase == "press"
     world.contact_allowed, world.push = True, 4.0
     world.fly(3.0)
+    assert world.painter.waits_for(world.inputs).startswith("push 4.00 N, commanded 5.00 N, limit ")
     assert world.painter.phase == "press"  # contact is not enough, and 80 % of the push are not
     world.push = 4.5
     world.fly(1.0, until="paint")
     assert world.painter.phase == "paint" and world.painter.row == 1
+
+
+@pytest.mark.parametrize(
+    ("phase", "condition"),
+    [
+        ("press", "contact, tip "),
+        ("paint", "the end of the paint"),
+        ("climb", "place "),
+        ("retreat", "distance "),
+    ],
+)
+def test_a_phase_names_the_condition_that_it_waits_for(phase: str, condition: str) -> None:
+    world = flown(phase, rows=2)
+    world.step()
+    assert world.painter.phase == phase
+    assert world.painter.waits_for(world.inputs).startswith(condition)
 
 
 @pytest.mark.parametrize("aside", [(0.012, 0.0), (0.0, 0.012), (0.0, -0.012)])
