@@ -9,6 +9,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -243,7 +245,21 @@ def limit_files(size: int) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
-def test_a_full_disk_in_flight(tmp_path: Path) -> None:
+@contextmanager
+def full_disk(monkeypatch: pytest.MonkeyPatch, size: int) -> Iterator[None]:
+    """`limit_files` for a while, without bytecode: CPython 3.11 keeps bytecode that a limit has cut short."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with monkeypatch.context() as context:
+        context.setattr(sys, "dont_write_bytecode", True)
+        limit_files(size)
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_in_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # as in `full_disk`
     process = start(tmp_path / "run", "--law", "qp", preexec_fn=lambda: limit_files(1_000_000))
     out, err = process.communicate(timeout=200)
     assert process.returncode == 2 and out == b"" and err.count(b"\n") == 1, err.decode()
@@ -256,17 +272,15 @@ def test_a_full_disk_in_flight(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [1000, 100_000])
-def test_a_full_disk_at_the_end(flown: Path, capfd: pytest.CaptureFixture[str], size: int) -> None:
+def test_a_full_disk_at_the_end(
+    flown: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
     words = ["paint", "--json", "--no-video", "--law", "qp", "--out", "run"]
     assert main([*words, "--seed", "1"]) == 0
     before = content(flown / "run")
     capfd.readouterr()
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    limit_files(size)
-    try:
+    with full_disk(monkeypatch, size):
         assert main([*words, "--seed", "2", "--overwrite"]) == 2
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert "cannot write run/log.npz: File too large" in one_line(capfd)
     assert content(flown / "run") == before
 
@@ -281,12 +295,8 @@ def test_a_full_disk_ends_other_commands_in_one_line(
 
     monkeypatch.setattr(sim.sweep.flying, "fly", lambda scene, options, **_: synthetic_trace(scene=scene))
     (flown / "spec.toml").write_text("")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    limit_files(1000)
-    try:
+    with full_disk(monkeypatch, 1000):
         assert main([*words, "--json", "--out", "run"]) == 2
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert "File too large" in one_line(capfd)
 
 
