@@ -101,6 +101,7 @@ def test_python_runs_in_one_namespace(page: Path, monkeypatch: pytest.MonkeyPatc
         exec(compile(snippet.text, f"{page.name}, block {number}", "exec"), names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", with_("sh"), ids=name)
 def test_commands_are_those_of_the_command_line(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for snippet in snippets(page, "sh"):

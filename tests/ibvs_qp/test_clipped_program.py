@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from controller_scenes import line_references
 from small_vehicle import SmallVehicle
 
@@ -36,6 +37,7 @@ def test_the_same_thrusts_where_no_limit_binds() -> None:
     np.testing.assert_allclose(clipped.thrusts, within.thrusts, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_clipping_gives_up_lift_and_level_where_the_program_gives_up_push() -> None:
     """While 20 N are pressed every rotor is limited to 20 N; 40 ms later the program still carries the weight."""
     lost = {}

@@ -63,6 +63,7 @@ def test_every_example_has_a_test() -> None:
     assert all(len((ROOT / "examples" / f"{name}.py").read_text().splitlines()) <= 70 for name in EXAMPLES)
 
 
+@pytest.mark.slow
 def test_plain_python_presses_and_slides() -> None:
     rows = re.findall(
         r"([\d.]+) s +(\w+) +push +(-?[\d.]+) N +height error +([-+][\d.]+) mm +slid +([-+][\d.]+) m +(\w+)",
@@ -89,6 +90,7 @@ def test_a_simulator_is_wired_up_in_few_lines() -> None:
     assert glue("other_simulator") + glue("rigid_body") <= 150
 
 
+@pytest.mark.slow
 def test_other_simulator_paints_two_rows_at_the_push_asked_for() -> None:
     text = printed("other_simulator")
     assert "failed: False all rows painted" in text and "by paint edge" in text

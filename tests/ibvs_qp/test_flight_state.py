@@ -82,6 +82,7 @@ def replayed(case: str) -> Callable[[Any, int], Command]:
     return step
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "snapshots"),
     [
@@ -138,6 +139,7 @@ class FaultyFlight:
         return command
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [Pilot, lambda: Assured(HybridController())])
 def test_a_supervised_fault_continues(make: Callable[[], Any]) -> None:
     flown, other = make(), make()
@@ -170,6 +172,7 @@ def continued(config: Any, state: FlightState, begin: int, ticks: int) -> list[t
     return [numbers(step(pilot, tick)) for tick in range(begin, begin + ticks)]
 
 
+@pytest.mark.slow
 def test_a_child_process_continues() -> None:
     config, step = CASES["paint_paper_law"].config(), replayed("paint_paper_law")
     pilot = Pilot(config)

@@ -79,6 +79,7 @@ class HostileFlight(RuleBasedStateMachine):
             assert command.mode != "hold", "good inputs are flown again"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_whatever_comes_in_what_comes_out_is_safe(name: str) -> None:
     machine = type(HostileFlight)(name, (HostileFlight,), {"name": name})

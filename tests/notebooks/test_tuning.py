@@ -51,6 +51,7 @@ def test_weights_and_soft_limits_do_not_touch_the_analytic_flight():
     assert analytic_setting(turned(Setting(), {"pilot.controller.vehicle.thrust_max_n": 20.0})) != base
 
 
+@pytest.mark.slow
 def test_a_comparison_reports_the_changes_and_their_effect():
     bench = TuningBench()
     bench.compare()
@@ -66,6 +67,7 @@ def test_a_comparison_reports_the_changes_and_their_effect():
     assert "thrust_max_n" in refused.refusal and refused.now is changed.now
 
 
+@pytest.mark.slow
 def test_a_push_that_was_reduced_is_named_with_both_values():
     values = {"scene.paint.push_n": 26.5, "scene.wall.friction": 0.8}
     reduced = fly_setting(turned(Setting(), values), hold_s=1.6)
@@ -108,6 +110,7 @@ def test_a_preset_is_loaded_or_the_reason_named(tmp_path):
     assert starts[-1] != eight and refusals[-1] == ""
 
 
+@pytest.mark.slow
 def test_the_figure_of_eight_rotors_is_drawn():
     bench = TuningBench(load_setting("octorotor_qp"))
     assert picture(draw_dashboard, bench.compare()).png
@@ -125,6 +128,7 @@ def test_a_picture_has_the_style_and_the_description_of_its_figure():
     assert shown.text == "A curve." and pixels is not None and pixels.shape[0] == 2.0 * DOTS_PER_INCH
 
 
+@pytest.mark.slow
 def test_force_ceiling_halves_the_peak_of_a_bad_force_law():
     """Measured: 15.6 N without the ceiling, 6.4 N with it; a bouncing flight differs by 2 N between processors."""
     bad = {"gains.force_kfp": 4.0, "gains.force_ksd": 0.0, "touch_ramp": False, "limits.push_barrier": False}
@@ -135,6 +139,7 @@ def test_force_ceiling_halves_the_peak_of_a_bad_force_law():
     assert without > 12.0 and flight_figures(limited.now)["greatest push [N]"] < 0.6 * without
 
 
+@pytest.mark.slow
 def test_a_saved_setting_is_flown_by_paint(tmp_path, capsys):
     """The files come back equal, and the command line flies them: a heavier push on a short board."""
     base = Setting()

@@ -18,6 +18,7 @@ FLOWN = [name for name, case in CASES.items() if case.config().law == "qp"]
 CHECKED = 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FLOWN)
 def test_osqp_solves_every_recorded_tick_like_daqp(name: str) -> None:
     controller, case = CASES[name].controller(), CASES[name]

@@ -236,6 +236,7 @@ def test_a_stamp_far_ahead_does_not_end_the_ramp() -> None:
     assert press.state.in_contact and ramp < press.state.ramp < 0.5
 
 
+@pytest.mark.slow
 def test_lambda_falls_from_one_to_zero_with_depth() -> None:
     config = ControllerConfig(touch_ramp=False)
     settings, weights = config.contact, []

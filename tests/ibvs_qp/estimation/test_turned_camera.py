@@ -84,6 +84,7 @@ def test_what_a_straight_camera_cannot_see_is_named() -> None:
     assert rejected == [f"lines: 1 {OUT_OF_VIEW}", f"plane: {OUT_OF_VIEW}"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [HybridController, PaperController])
 @pytest.mark.parametrize("turn", [(0.0, 15.0, 0.0), (10.0, -20.0, 15.0)])
 def test_a_controller_flies_a_turned_camera_like_a_straight_one(law: Callable[..., Any], turn: Turn) -> None:

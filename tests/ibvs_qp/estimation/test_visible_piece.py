@@ -27,6 +27,7 @@ def axes_of(wall: Wall) -> WallAxes:
     return WallAxes.of(wall.normal, wall.gravity)
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(angle, angle, angle, angle, st.floats(-0.02, 0.5), st.floats(-0.2, 0.2), st.floats(-0.15, 0.15), st.booleans())
 def test_middle_and_length_of_the_visible_piece(

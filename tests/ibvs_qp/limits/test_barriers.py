@@ -112,6 +112,7 @@ def test_a_guide_is_not_steered_out_of_the_picture() -> None:
     assert without.rho > 0.384
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_view_ends_where_the_picture_ends(mirrored: bool) -> None:
     """A guide that a wide camera still shows is steered to its place; a camera turned up ends nearer to the axis."""
@@ -124,6 +125,7 @@ def test_view_ends_where_the_picture_ends(mirrored: bool) -> None:
     assert fly(config(vehicle=shifted), reference, 4.0, lines=1).rho < 0.384 - 100.0 / 625.22
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [{"force_kfp": 2.0}, {"force_kfi": 7.0}])
 def test_push_stays_below_its_ceiling_under_gains_that_oscillate(wrong: dict[str, float]) -> None:
     gains, reference = Gains(force_ksd=0.0, **wrong), Reference(push_force=5.0, contact=True)
@@ -147,6 +149,7 @@ def test_a_fast_approach_is_braked_before_it_touches() -> None:
     assert without.push > 12.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "tilt_deg", "rho"), [(1.0, 0.71, 0.355), (0.1, 0.71, 0.370), (0.03, 0.71, 0.414)])
 def test_prices_are_worth_what_the_settings_say(factor: float, tilt_deg: float, rho: float) -> None:
     """A guide leaves the picture at 0.384: at a thirtieth of the price. The level rows hold the tilt by themselves."""

@@ -105,6 +105,7 @@ def test_every_integrator_rests_while_limits_take_what_it_asks_for(law: type, di
     assert held is not None and np.any(held != 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_speed_out_of_reach_is_forgotten_with_the_wish(law: type) -> None:
     """Half a metre a second asked of rotors that cannot: released, the vehicle stops instead of making up for it."""
@@ -120,6 +121,7 @@ def test_a_speed_out_of_reach_is_forgotten_with_the_wish(law: type) -> None:
         assert after[:, 1].max() - weak[-1, 1] < 0.05
 
 
+@pytest.mark.slow
 def test_lines_out_of_reach_are_come_back_to_without_overshoot() -> None:
     loop, two = Loop(HybridController(), distance=0.1, count=2), replace(FREE, lines=line_references(2))
     home = loop.fly(SETTLE, two)[-1, 1]
@@ -132,6 +134,7 @@ def test_lines_out_of_reach_are_come_back_to_without_overshoot() -> None:
     assert home - after[:, 1].min() < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_push_out_of_reach_leaves_no_debt(law: type) -> None:
     """Asked for 40 N of 30.4 N without the reach check: what is missing is not collected afterwards."""
@@ -149,6 +152,7 @@ def test_a_push_out_of_reach_leaves_no_debt(law: type) -> None:
         assert after[:, 0].min() > 2.5 and abs(after[-25:, 0].mean() - 5.0) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_the_lag_of_a_ramp_fills_no_integral(law: type) -> None:
     """A push of 25 N overshoots little, although motors and filter are late."""
@@ -157,6 +161,7 @@ def test_the_lag_of_a_ramp_fills_no_integral(law: type) -> None:
     assert push.max() < 1.12 * 25.0 and abs(push[-100:].mean() - 25.0) < 0.3
 
 
+@pytest.mark.slow
 def test_an_integral_that_alone_keeps_the_thrusts_limited_falls(monkeypatch: pytest.MonkeyPatch) -> None:
     """28 N of 30.4 N and 5 N of integral too much, as a touch may leave them: limited, it must fall."""
     loop = Loop(HybridController(integrating(reach_check=False)), distance=0.005)

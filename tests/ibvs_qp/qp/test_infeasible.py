@@ -53,6 +53,7 @@ def said(command: Command) -> tuple[str, ...]:
     return tuple(words.removeprefix(WORDS).split(", "))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spin", [1.2, 2.0])  # rad/s: about one axis too many, about several
 def test_every_conflict_is_named_and_nothing_is_named_that_could_be_spared(spin: float) -> None:
     rng, controller, conflicts, sets = np.random.default_rng(0), HybridController(HARD), 0, set()

@@ -60,6 +60,7 @@ def test_recorded_ticks_have_the_thrusts_of_the_exact_solution(name: str) -> Non
     assert limited > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_flight_is_that_of_osqp(name: str) -> None:
     flights = []

@@ -552,6 +552,7 @@ def test_fuzz(controller: Any, steps: list[tuple[dict[str, Any], Any]]) -> None:
     assert command.outcome is not Outcome.HOLD and command.rejected == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
     "lie",

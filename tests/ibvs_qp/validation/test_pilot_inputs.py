@@ -88,6 +88,7 @@ def broken_features() -> dict[str, dict[str, Any]]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", broken_features())
 def test_no_broken_features_reach_a_filter(name: str, clean: list[Command]) -> None:
     at = next(tick for tick in range(BROKEN_AT, BROKEN_AT + 20) if frames()[tick].features is not None)

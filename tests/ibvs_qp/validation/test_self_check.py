@@ -107,6 +107,7 @@ def test_an_attitude_that_is_level_in_wrong_axes_is_found_in_a_turn(
         assert check.passed == (axis not in axes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bias", [0.05, -0.01])
 def test_a_gyro_bias_and_leaps_of_yaw_are_no_wrong_axes(bias: float) -> None:
     check, rng = SelfCheck(True), np.random.default_rng(1)
@@ -117,6 +118,7 @@ def test_a_gyro_bias_and_leaps_of_yaw_are_no_wrong_axes(bias: float) -> None:
         assert check.faults() == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_a_noisy_attitude_is_not_in_other_axes(seed: int) -> None:
     """0.5 degrees a sample; every second the vehicle turns by a degree in a quarter of a second, there or back."""

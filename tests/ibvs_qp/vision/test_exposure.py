@@ -25,6 +25,7 @@ def test_the_same_light_passes_the_very_same_picture() -> None:
         assert steps.level(rgb, 1 + tick * FRAME_NS) is rgb
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [0.75, 1.25])
 def test_a_step_is_levelled_and_fades(step: float) -> None:
     steps, means = ExposureSteps(), []

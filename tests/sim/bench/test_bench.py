@@ -37,6 +37,7 @@ def write_folder(folder: Path, **changes: str) -> None:
         writer.writerow(row)
 
 
+@pytest.mark.slow
 def test_one_json_line_with_rows_stages_and_ratios(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     write_folder(tmp_path)
     clock = checks.stage_time

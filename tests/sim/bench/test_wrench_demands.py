@@ -24,6 +24,7 @@ def rows(bench: dict) -> dict:
     return bench["table"](4000)["rows"]
 
 
+@pytest.mark.slow
 def test_the_program_gives_up_lateral_force_alone(rows: dict) -> None:
     program = rows["program"]
     assert program["vertical_n"] <= 0.5

@@ -84,6 +84,7 @@ def test_a_bridge_that_hears_nothing_waits_and_ends(
     assert status["state"] == "waiting" and status["commands"] == 0 and 60 <= status["timing"]["ticks"] <= 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["tarot_t960_qp", "octorotor_qp"])
 def test_a_dry_run_shows_the_thrust_at_full_command_that_px4_gets_too(
     capsys: pytest.CaptureFixture[str], preset: str
@@ -104,6 +105,7 @@ def started(*words: str, **streams: object) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, env=environment(), **streams)  # type: ignore[call-overload]
 
 
+@pytest.mark.slow
 def test_a_reader_that_left_does_not_end_the_bridge() -> None:
     reading, writing = os.pipe()
     os.close(reading)
@@ -112,6 +114,7 @@ def test_a_reader_that_left_does_not_end_the_bridge() -> None:
         assert process.wait(60) == 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_with_the_timing(tmp_path: Path) -> None:
     with started(stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdout is not None
@@ -165,6 +168,7 @@ def test_detect_reads_the_pictures_of_a_bag(capsys: pytest.CaptureFixture[str]) 
     assert [file.name for file in Path("drawn").iterdir()] == ["bag_000000_1000000000_overlay.png"]
 
 
+@pytest.mark.slow
 def test_depth_of_a_camera_beside_is_registered_by_the_settings(capsys: pytest.CaptureFixture[str]) -> None:
     truth = render_frame(sample_scene(FAMILIES["realsense_d435"], 4))
     assert truth.raw is not None and truth.raw.depth.shape != truth.raw.rgb.shape[:2]

@@ -240,6 +240,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words", ["experiment gust --plan", "sweep x.toml", "compare a b", "faults --plan", "tune --trials 1"]
 )
@@ -259,6 +260,7 @@ def test_a_study_without_its_packages_names_the_extra(tmp_path: Path, words: str
     )
 
 
+@pytest.mark.slow
 def test_paint_needs_no_package_of_the_studies(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text("[paint]\nrows = 1\nstroke_m = 0.2\n")
     words = "paint --law qp --scene short.toml --features geometric --no-video --out run".split()
@@ -285,10 +287,11 @@ def _paint(out: Path, *words: str) -> list[str]:
     return [sys.executable, "-c", program, "paint", "--features", "geometric", "--json", "--out", str(out), *words]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "group",
     [
-        pytest.param(False, marks=pytest.mark.slow, id="parent alone"),
+        pytest.param(False, id="parent alone"),
         pytest.param(True, id="whole group, as a terminal does"),
     ],
 )
@@ -309,6 +312,7 @@ def test_ctrl_c_ends_both_processes_with_a_partial_run(tmp_path, group):
     assert (tmp_path / "run" / "summary.json").exists()
 
 
+@pytest.mark.slow
 def test_error_found_by_a_worker_is_one_line(tmp_path):
     """The number of rotors is compared with the scene where the plant is built, in the process that flies."""
     (tmp_path / "scene.toml").write_text("[plant]\nthrust_min_n = [1.0, 2.0]\n")

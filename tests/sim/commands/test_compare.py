@@ -29,6 +29,7 @@ def flown(monkeypatch, tmp_path):
     return flights
 
 
+@pytest.mark.slow
 def test_two_presets_fly_the_same_short_job(tmp_path, capsys):
     assert main(["compare", *PAIR, *SHORT, "--out", str(tmp_path / "run")]) == 0
     content = json.loads(capsys.readouterr().out)

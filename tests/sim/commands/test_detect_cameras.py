@@ -77,6 +77,7 @@ def check(capsys: pytest.CaptureFixture[str], words: list[str], most_px: float =
     assert frame["plane"]["distance_m"] == pytest.approx(1.0 / exact, abs=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("color", ["color.png", "grey.png"])
 def test_depth_of_a_camera_beside_by_a_file(folder: Path, capsys: pytest.CaptureFixture[str], color: str) -> None:
     check(capsys, one("--rgb", color, "--depth", "depth.png", "--camera", "camera.toml"))

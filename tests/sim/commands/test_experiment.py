@@ -114,6 +114,7 @@ def same(one, other):
     return True
 
 
+@pytest.mark.slow
 def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path, capsys):
     words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
     monkeypatch.setattr("sim.sweep.again.outcome", sim.sweep.flying.outcome)
@@ -183,6 +184,7 @@ def test_plan_flies_nothing(flown, tmp_path, capsys, size):
     assert not flown and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_compare_pairs_two_folders(flown, capsys):
     for seed, folder in (("0", "a"), ("0", "b")):
         main(["experiment", "approach", "--quick", "--jobs", "1", "--json", "--seed", seed, "--out", folder])

@@ -36,6 +36,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Trace]:
     return folder, traces["qp"]
 
 
+@pytest.mark.slow
 def test_recorded_ticks_solve_to_the_thrusts_that_flew(run: tuple[Path, Trace]) -> None:
     trace = load_run(run[0])["qp"]
     for tick in range(0, len(trace.t), len(trace.t) // 25):

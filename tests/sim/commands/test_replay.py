@@ -27,6 +27,7 @@ def paint(folder: Path, *words: str) -> Path:
     return folder / "run"
 
 
+@pytest.mark.slow
 def test_a_painted_flight_replays_to_the_bit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     flown = paint(tmp_path, "--features", "geometric")
     capsys.readouterr()
@@ -66,6 +67,7 @@ def test_the_log_has_pictures_poses_and_the_truth_apart(tmp_path: Path) -> None:
         assert np.abs(off[settled]).max() < bound, axis
 
 
+@pytest.mark.slow
 def test_another_preset_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "a.mcap"
     record(file, "press_beyond_reach", "pilot", 1700)

@@ -142,6 +142,7 @@ def test_after_kill_9_the_rows_are_there(tmp_path: Path, law: str, capfd: pytest
     assert json.loads(capfd.readouterr().out)["tasks"]
 
 
+@pytest.mark.slow
 def test_rows_on_the_disk_are_the_rows_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed before any tick of a flight, at most a chunk of 25 rows is missing."""
     from closed_loop_rigs import short_scene
@@ -173,9 +174,8 @@ def test_rows_on_the_disk_are_the_rows_flown(tmp_path: Path, monkeypatch: pytest
     assert len(load_run(tmp_path)["qp"].t) == len(whole.t) - 1
 
 
-@pytest.mark.parametrize(
-    "group", [pytest.param(False, marks=pytest.mark.slow, id="parent alone"), pytest.param(True, id="whole group")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("group", [pytest.param(False, id="parent alone"), pytest.param(True, id="whole group")])
 def test_sigterm_writes_the_partial_run(tmp_path: Path, group: bool) -> None:
     process = start(tmp_path / "run")
     wait_for_rows(tmp_path / "run", 2)
@@ -190,6 +190,7 @@ def test_sigterm_writes_the_partial_run(tmp_path: Path, group: bool) -> None:
     assert not list((tmp_path / "run").glob("partial-*"))
 
 
+@pytest.mark.slow
 def test_sigterm_ends_a_background_job_with_ctrl_c_ignored(tmp_path: Path) -> None:
     """A shell without job control starts jobs in that way."""
     process = start(tmp_path / "run", "--law", "qp", preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
@@ -199,6 +200,7 @@ def test_sigterm_ends_a_background_job_with_ctrl_c_ignored(tmp_path: Path) -> No
     assert process.returncode == 143, err.decode()
 
 
+@pytest.mark.slow
 def test_two_runs_into_one_folder(tmp_path: Path) -> None:
     first = start(tmp_path / "run", "--law", "qp")
     wait_for_rows(tmp_path / "run", 1, 1)
@@ -258,6 +260,7 @@ def full_disk(monkeypatch: pytest.MonkeyPatch, size: int) -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
+@pytest.mark.slow
 def test_a_full_disk_in_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # as in `full_disk`
     process = start(tmp_path / "run", "--law", "qp", preexec_fn=lambda: limit_files(1_000_000))

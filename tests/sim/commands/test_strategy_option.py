@@ -91,6 +91,7 @@ def test_what_cannot_fly_is_refused_in_one_line(folder, capsys, name, words):
     assert not out and err.count("\n") == 1 and words in err and not (folder / "run").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["own_strategies:Hover", "own_strategies.py:Hover", EXAMPLE])
 def test_a_class_is_flown_by_module_or_file_and_stated_in_the_summary(folder, capsys, monkeypatch, name):
     flown: list[Job | None] = []
@@ -109,6 +110,7 @@ def test_a_class_is_flown_by_module_or_file_and_stated_in_the_summary(folder, ca
     assert load_run("run")["qp"].legs == ((-0.3, 0.0),)
 
 
+@pytest.mark.slow
 def test_a_strategy_that_raises_in_flight_is_reported_and_the_vehicle_comes_back(folder, capsys):
     assert main([*PAINT, "own_strategies:Late"]) == 0
     out, err = capsys.readouterr()

@@ -38,6 +38,7 @@ def test_a_reader_that_left(words: tuple[str, ...]) -> None:
     assert (code, err) == (2, "ibvs-qp: error: the disk or the output: Broken pipe\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [PLAN, ("compare", "--help")])
 def test_closed_output(words: tuple[str, ...]) -> None:
     assert run(words, preexec_fn=lambda: os.close(1)) == (0, "")

@@ -130,6 +130,7 @@ main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"])
 """
 
 
+@pytest.mark.slow
 def test_killed_half_way_and_resumed_gives_the_same_table(flown):
     program = [sys.executable, "-c", _KILLED.format(tests=str(Path(__file__).parent))]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -143,6 +144,7 @@ def test_killed_half_way_and_resumed_gives_the_same_table(flown):
     assert table_of("run").equals(table_of("whole"))
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_gives_the_same_table(flown, tmp_path):
     distributed = pytest.importorskip("distributed", reason="a Dask cluster needs the extra cluster")
     from sim.sweep.cluster import require_usable
@@ -202,6 +204,7 @@ def test_seed_replaces_that_of_the_spec(flown):
     assert set(table_of("run")["seed"]) == {40}
 
 
+@pytest.mark.slow
 def test_report_draws_boxes_maps_and_success(drawn, capsys):
     main(["sweep", "spec.toml", "--jobs", "1", "--json", "--out", "run"])
     page = Path("run/report.md").read_text()
@@ -218,6 +221,7 @@ def test_report_draws_boxes_maps_and_success(drawn, capsys):
     assert "force_rms_n" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_report_of_parts_alone_and_of_a_single_parameter(drawn, tmp_path):
     Path("spec.toml").write_text(SPEC)
     run_sweep(Planned(load_spec(Path("spec.toml"))), Path("run/parts"), block_runs=3)

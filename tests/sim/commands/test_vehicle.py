@@ -86,6 +86,7 @@ def test_user_errors_are_one_line(capsys: pytest.CaptureFixture[str], words: lis
     assert out == "" and err.count("\n") == 1 and needle in err
 
 
+@pytest.mark.slow
 def test_what_a_file_does_not_state_is_marked(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["vehicle", "tarot_t960_qp", "--px4", "t.params"]) == 0
     capsys.readouterr()
@@ -111,6 +112,7 @@ def test_derived_values_are_listed_with_their_source(capsys: pytest.CaptureFixtu
     assert "contact.depth_min_m 0.55 m stated" in {" ".join(x.split()) for x in capsys.readouterr().out.splitlines()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("own", "push", "needle"),
     [

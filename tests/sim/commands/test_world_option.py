@@ -46,6 +46,7 @@ def flown(monkeypatch, tmp_path):
     return found
 
 
+@pytest.mark.slow
 def test_paint_flies_a_world_and_states_it_everywhere(flown, capsys):
     assert main([*PAINT, "--world", "harsh"]) == 0
     assert flown == [world_errors("harsh")]
@@ -56,6 +57,7 @@ def test_paint_flies_a_world_and_states_it_everywhere(flown, capsys):
     assert load_run("run")["qp"].scene.errors == world_errors("harsh")
 
 
+@pytest.mark.slow
 def test_a_file_is_a_world_too(flown, capsys):
     Path("mine.toml").write_text("[gyro]\nbias_rad_s = 0.004\n", encoding="utf-8")
     assert main([*PAINT, "--world", "mine.toml"]) == 0
@@ -71,6 +73,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_errors_of_a_scene_file_hold_where_it_has_any_and_a_named_world_wins(flown, capsys, name):
     text, world, errors = SCENES[name]
@@ -81,6 +84,7 @@ def test_errors_of_a_scene_file_hold_where_it_has_any_and_a_named_world_wins(flo
         assert (json.loads(capsys.readouterr().out)["world"], flown[-1]) == expected
 
 
+@pytest.mark.slow
 def test_every_command_has_the_same_default_world(flown, capsys):
     quick = ["--quick", "--features", "geometric", "--jobs", "1", "--json"]
     for words in (PAINT, ["compare", PRESET, PRESET, "--seeds", "1", *quick], ["experiment", "noise-sweep", *quick]):
@@ -89,6 +93,7 @@ def test_every_command_has_the_same_default_world(flown, capsys):
     assert set(flown) == {world_errors(DEFAULT_WORLD)}
 
 
+@pytest.mark.slow
 def test_the_tables_are_titled_with_the_world(flown, capsys):
     quick = ["--quick", "--features", "geometric", "--jobs", "1", "--world", "harsh"]
     paint = [word for word in PAINT if word != "--json"]
@@ -112,6 +117,7 @@ def test_compare_and_experiment_fly_a_world(flown, capsys):
     assert set(flown) == {world_errors("harsh")}
 
 
+@pytest.mark.slow
 def test_one_error_at_a_time_is_flown_in_the_ideal_world_and_named_so():
     runs = designs("mismatch", Choice(world="harsh"))
     (right,) = {run.plan.scene.errors for run in runs if run.params["error"] == "nothing"}

@@ -101,6 +101,7 @@ def test_the_page_has_every_number_from_the_table():
     assert str(fields.mixed("path_rms_m")["law"]) in text
 
 
+@pytest.mark.slow
 def test_every_cell_crosses_laws_and_gains_with_the_same_seeds():
     cells: dict[str, dict[tuple[str, str], list[int]]] = {}
     for run in design(experiment(FAIR), Choice(compiled=True)):

@@ -40,6 +40,7 @@ def compared(**theirs: Any) -> dict[str, Comparison]:
     return {each.words.split(",")[0]: each for each in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMPARED)
 def test_every_opponent_flies_every_cell_of_the_qp_with_its_seeds(name: str) -> None:
     flown: dict[tuple[str, str], dict[tuple[str, str], set[int]]] = {}
@@ -132,6 +133,7 @@ def test_the_times_are_those_of_every_law_in_its_own_slide(monkeypatch: pytest.M
     assert len({seed for *_, seed in flown}) == 1
 
 
+@pytest.mark.slow
 def test_the_page_counts_what_the_table_of_flights_has() -> None:
     folder = Path(__file__).parents[3] / "docs/experiments"
     found = comparisons(pl.read_parquet(folder / "losses.parquet"))

@@ -87,6 +87,7 @@ def test_a_bound_may_hold_for_a_share_of_the_flights(good, met):
     assert evaluate(median, {}, rows, {}).met is met
 
 
+@pytest.mark.slow
 def test_levels_vary_from_the_last_to_the_first_and_laws_share_seeds():
     runs = design(experiment("friction"), Choice(seed=4))
     first = [(run.variant, run.params["friction"], run.law, run.seed) for run in runs[:21]]
@@ -140,6 +141,7 @@ def test_every_cell_has_enough_pairs_for_a_significant_difference(name):
     assert all(flights.seeds >= 10 for flights in each.flights if flights.levels.get("kind") != ("map",))
 
 
+@pytest.mark.slow
 def test_worlds_flies_every_law_on_the_same_random_scenes_in_three_worlds():
     runs = design(experiment("worlds"), Choice(world="ideal"))
     laws = {(run.law, run.plan.config.controller.allocator) for run in runs}

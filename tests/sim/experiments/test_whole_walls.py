@@ -49,6 +49,7 @@ def test_strokes_keep_the_margin_at_both_ends():
         assert scene.paint.stroke_m == pytest.approx(length - 2 * scene.paint.edge_margin_m)
 
 
+@pytest.mark.slow
 def test_both_laws_fly_the_same_checked_scenes_and_there_are_200_flights_with_faults():
     runs = runs_of(SETS, LAWS)  # a scene that is refused raises here
     assert [run.expected_s for run in runs] == sorted(run.expected_s for run in runs)

@@ -29,6 +29,7 @@ def test_the_same_after_contact_and_with_another_wander(row, place, seed):
     assert not failures(row, place, "datasheet", seed)
 
 
+@pytest.mark.slow
 def test_a_leap_of_the_attitude_does_not_press_with_14_n():
     assert not failures("attitude step 3 deg in pitch", "free", "ideal", 1)
 

@@ -93,6 +93,7 @@ def test_control_flights_alone_make_a_page():
     assert "| a | contact | – |" in page(judged, [], "", "", VEHICLE)
 
 
+@pytest.mark.slow
 def test_the_full_design_flies_every_row_and_fewer_controls():
     runs = design(Choice())
     places = sum(len(row.places) for row in scenarios())

@@ -16,6 +16,7 @@ from sim.flight.options import FlightOptions
 OPTIONS = FlightOptions(features="geometric", video=False)
 
 
+@pytest.mark.slow
 def test_a_watched_flight_goes_on_after_the_end_of_the_strategy_and_is_completed():
     fault = NoFault(after="retreat", delay_s=0.0, watch_s=4.0)
     trace = fly(short_job(0.2, rows=1), OPTIONS, faults=(fault,))

@@ -76,6 +76,7 @@ def test_a_focal_ratio_needs_pictures():
         World(scene, OPTIONS, pilot_config(scene, OPTIONS))
 
 
+@pytest.mark.slow
 def test_a_camera_pitched_by_12_degrees_and_a_force_sensor_on_its_side_hold_the_push():
     config = pilot_config(near_wall(), OPTIONS)
     vehicle = dataclasses.replace(

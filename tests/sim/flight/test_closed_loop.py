@@ -17,7 +17,8 @@ from sim.world.plant_scene import PlantScene
 from sim.world.scene import CameraScene, ForceTorqueScene
 
 
-@pytest.mark.parametrize("law", ["qp", pytest.param("paper", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["qp", "paper"])
 def test_hold_at_high_friction_does_not_hunt(law: str) -> None:
     """20 s at mu 0.8: feeding the measured force forward would hunt and lose contact (design, section 4.3)."""
     log = hold(short_scene(wall=wall(friction=0.8)), law, 20.0)
@@ -46,6 +47,7 @@ def test_slide(law: str, friction: float) -> None:
         assert metrics["outcomes"]["solved"] >= 0.999 * sum(metrics["outcomes"].values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "sections"),
     [
@@ -69,6 +71,7 @@ def test_plants_the_controller_was_not_told_of(name: str, sections: dict) -> Non
     assert metrics["tilt_peak_deg"] <= 3.0
 
 
+@pytest.mark.slow
 def test_same_seed_same_thrusts_to_the_bit() -> None:
     first, _ = fly_geometric(short_scene(stroke_m=0.2, rows=1), seed=3)
     second, _ = fly_geometric(short_scene(stroke_m=0.2, rows=1), seed=3)
@@ -90,6 +93,7 @@ def test_a_period_of_no_whole_physics_steps_is_refused(tick_s: float) -> None:
         fly(short_scene(), FlightOptions(law="qp", features="geometric"), config=with_period(tick_s))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [2, 5])
 def test_the_loop_ticks_at_the_controllers_period(steps: int) -> None:
     scene = short_scene(stroke_m=0.2, rows=1)

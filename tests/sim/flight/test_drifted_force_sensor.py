@@ -12,6 +12,7 @@ from sim.world.scene import Scene
 from sim.world.worlds import in_world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [13, 16])
 def test_a_vehicle_with_a_drifted_force_sensor_leaves_the_wall(seed: int) -> None:
     """Without contact a measured pull of 5 N counted as one, and the rotors held the brush at the wall against it."""

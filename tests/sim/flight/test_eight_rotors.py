@@ -28,6 +28,7 @@ FULL = 35.0
 VEHICLE = VehicleParams(geometry=OCTOROTOR, thrust_max_n=FULL, propeller_radius_m=0.165)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_paints_in_the_closed_loop(law: str) -> None:
     preset = ibvs_qp.preset(law)
@@ -48,6 +49,7 @@ def margin(thrusts: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     return float(np.minimum(thrusts - low, high - thrusts).min())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("push", "lost"), [(10.0, None), (18.0, None), (6.0, 5)])
 def test_redundant_thrusts_keep_away_from_the_limits(push: float, lost: int | None) -> None:
     """Of the largest margin of this wrench they leave 15 %; a rotor that is nearly lost keeps between its limits."""

@@ -77,15 +77,18 @@ def test_a_held_tip_is_no_pivot_to_rock_about(law: str) -> None:
     assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_the_softer_yaw_of_a_held_tip_holds_stiff_gains() -> None:
     assert rocking(press(**STIFF_YAW)) < 0.5
 
 
+@pytest.mark.slow
 def test_without_the_softer_yaw_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(feedforward, "STIFFNESS_FRACTION", 1e3)
     assert rocking(press(**STIFF_YAW)) > 1.0
 
 
+@pytest.mark.slow
 def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
     trace = press(35.0, reach_check=False)
     assert trace.claimed
@@ -93,6 +96,7 @@ def test_a_push_beyond_reach_takes_no_damping_from_a_held_tip() -> None:
     assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("push", "least"), [(35.0, 0.97), (40.0, 0.95)])
 def test_stiff_velocity_gains_take_no_damping_either(push: float, least: float) -> None:
     trace = press(push, reach_check=False, **FIRM)
@@ -100,6 +104,7 @@ def test_stiff_velocity_gains_take_no_damping_either(push: float, least: float) 
     assert trace.push_true[held(trace)].mean() >= least * REACH_N
 
 
+@pytest.mark.slow
 def test_at_the_weight_of_a_sliding_vehicle_they_would(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(velocity, "stationary_sideways_weight", lambda weights: weights.velocity)
     trace = press(40.0, reach_check=False, **FIRM)
@@ -107,12 +112,14 @@ def test_at_the_weight_of_a_sliding_vehicle_they_would(monkeypatch: pytest.Monke
     assert trace.push_true[held(trace)].mean() < 0.9 * REACH_N
 
 
+@pytest.mark.slow
 def test_a_held_tip_turns_with_the_body_whatever_a_slide_counts_on() -> None:
     trace = press(35.0, reach_check=False, body_rotation_gain=0.05)
     assert rocking(trace) < 0.5
     assert trace.push_true[held(trace)].mean() >= 0.97 * REACH_N
 
 
+@pytest.mark.slow
 def test_counted_on_as_in_a_slide_it_would_lose_push(monkeypatch: pytest.MonkeyPatch) -> None:
     def as_in_a_slide(model: Model) -> ca.SX:
         return 1.0 - model.contact_weight * (1.0 - model.gains.body_rotation_gain)
@@ -139,6 +146,7 @@ def lines_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(WallMotion, "correct", blind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 @pytest.mark.usefixtures("lines_lost")
 def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
@@ -148,11 +156,13 @@ def test_nor_is_it_one_to_nod_about_on_a_blank_wall(law: str) -> None:
     assert trace.push_true[held(trace)].mean() == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("lines_lost")
 def test_the_softer_pitch_of_a_held_tip_holds_stiff_gains() -> None:
     assert nodding(press(hold_s=12.0, **STIFF_PITCH)) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("lines_lost")
 def test_without_the_softer_pitch_it_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(feedforward, "STIFFNESS_FRACTION", 1e3)

@@ -96,6 +96,7 @@ def ringing(push: np.ndarray, dt: float, least: float = 0.05) -> tuple[float, fl
     return ratio, 0.5 / half_period / math.sqrt(1.0 - ratio**2)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures(fresh_equations.__name__)
 @pytest.mark.parametrize("force_kfp", [0.8, 1.6, 2.2])  # with the shipped 0.02 nothing rings
 def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,14 +117,15 @@ def test_predicts_the_ringing_of_the_flown_contact(force_kfp: float, monkeypatch
     assert 0.95 * min(frequencies) <= frequency <= 1.05 * max(frequencies)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "latency", "gains"),
     [
         (3500.0, 0.004, {}),
         (1500.0, 0.004, {"force_kfp": 8.0}),
         (1500.0, 0.04, {"force_kfp": 4.0}),
-        pytest.param(1500.0, 0.04, {}, marks=pytest.mark.slow),
-        pytest.param(1500.0, 0.004, {"force_kfi": 20.0}, marks=pytest.mark.slow),
+        (1500.0, 0.04, {}),
+        (1500.0, 0.004, {"force_kfi": 20.0}),
     ],
 )
 def test_holds_where_a_margin_is_and_oscillates_where_none_is(stiffness: float, latency: float, gains: dict) -> None:

@@ -33,6 +33,7 @@ def small() -> ca.Function:
     return ca.Function("small", [x], [ca.sin(x[0]) * x[1] + x[0] / 3.0])
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("law", [HybridController, PaperController])
 def test_a_flight_on_machine_code_is_the_same_flight_to_the_bit(law: type, own_cache: Path) -> None:

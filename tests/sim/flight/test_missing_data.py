@@ -57,6 +57,7 @@ def behind(frame: SensorFrame) -> SensorFrame:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall_seen", [False, True])
 @pytest.mark.parametrize("hole_s", [0.3, 0.9, 1.5, 2.5, LONGEST_S])
 def test_a_contact_survives_a_hole_in_the_data(

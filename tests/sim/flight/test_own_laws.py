@@ -196,6 +196,7 @@ def test_the_fault_matrix_flies_a_law_of_the_users():
     assert runs and all(run.plan.options.controller == POLICY for run in runs)
 
 
+@pytest.mark.slow
 def test_paint_flies_the_example_and_names_it(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text("[paint]\nrows = 1\nstroke_m = 0.3\n[board]\nwidth_m = 0.4\n")

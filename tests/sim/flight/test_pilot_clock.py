@@ -70,6 +70,7 @@ def test_one_stamp_far_ahead_blinds_nobody(law: str) -> None:
         world.act(command.thrusts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 @pytest.mark.parametrize(
     ("leap_ns", "ticks"),

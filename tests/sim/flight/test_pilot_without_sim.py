@@ -39,13 +39,14 @@ with open(sys.argv[2], "wb") as file:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("features", "law"),
     [
         ("geometric", "qp"),
         ("geometric", "paper"),
         ("rendered", "qp"),
-        pytest.param("rendered", "paper", marks=pytest.mark.slow),
+        ("rendered", "paper"),
     ],
 )
 def test_same_thrusts_without_the_simulator(law: str, features: str, tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ def light(assumed: float = 0.8) -> PilotConfig:
     )
 
 
+@pytest.mark.slow
 def test_the_push_recovers_once_friction_is_measured_and_every_reason_is_named_once() -> None:
     trace = slide(10.0, light())
     begin, later = flown(trace)
@@ -79,12 +80,14 @@ def test_the_push_recovers_once_friction_is_measured_and_every_reason_is_named_o
     assert "measured, front_right at its lower limit of 1.2 N" in reasons[1]
 
 
+@pytest.mark.slow
 def test_a_lower_assumed_friction_presses_harder_from_the_start() -> None:
     begin, later = flown(slide(4.0, light(assumed=0.3)))
     print(f"4 N asked, friction 0.3 assumed: {begin:.2f} N at first, {later:.2f} N later")
     assert begin == pytest.approx(4.0, rel=0.1) and later == pytest.approx(4.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_push_within_reach_is_restored_with_an_event() -> None:
     trace = slide(4.0, light())
     begin, later = flown(trace)
@@ -94,6 +97,7 @@ def test_a_push_within_reach_is_restored_with_an_event() -> None:
     assert kinds == ["push reduced", "push restored"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_the_default_job_flies_its_push(law: str) -> None:
     trace = slide(5.0, law=law)
@@ -102,6 +106,7 @@ def test_the_default_job_flies_its_push(law: str) -> None:
     assert not [event for event in trace.events if event.kind.startswith("push ")]
 
 
+@pytest.mark.slow
 def test_friction_is_measured_at_a_creeping_speed_too() -> None:
     _, later = flown(slide(4.0, light(), speed=0.02))
     assert later == pytest.approx(4.0, rel=0.05)

@@ -55,7 +55,8 @@ def notes(trace: Trace) -> list[str]:
 STATIC = [(15.0, 0.3), (15.0, 0.05), (20.0, 0.3), (25.0, 0.3), (25.0, 0.05), (30.0, 0.3), (30.0, 0.05)]
 
 
-@pytest.mark.parametrize(("push", "friction"), [*STATIC, pytest.param(20.0, 0.05, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("push", "friction"), [*STATIC, (20.0, 0.05)])
 def test_a_static_push_within_reach_is_delivered(push: float, friction: float) -> None:
     trace = press(push, friction, reach_check=True)
     ticks = settled(trace)
@@ -88,7 +89,8 @@ def test_a_push_at_the_reach_costs_no_tilt(push: float, least: float) -> None:
     assert turned.max() <= 0.3
 
 
-@pytest.mark.parametrize("push", [*(pytest.param(push, marks=pytest.mark.slow) for push in (25.0, 26.0, 27.0)), 28.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("push", [25.0, 26.0, 27.0, 28.0])
 def test_within_reach_the_laws_push_alike(push: float) -> None:
     """Nothing is clipped in a quiet hold below the reach: there neither law has an advantage."""
     for law in ("qp", "paper"):
@@ -101,6 +103,7 @@ def test_within_reach_the_laws_push_alike(push: float) -> None:
         assert height <= 2e-3 and np.abs(np.degrees(trace.euler[ticks])).max() <= 0.3
 
 
+@pytest.mark.slow
 def test_beyond_reach_clipping_leans_on_the_wall_and_the_program_stays_level() -> None:
     """35 N unchecked."""
     program, clipped = (press(35.0, 0.3, reach_check=False, law=law) for law in ("qp", "paper"))
@@ -110,6 +113,7 @@ def test_beyond_reach_clipping_leans_on_the_wall_and_the_program_stays_level() -
     assert all(trace.push_true[settled(trace)].mean() >= 0.95 * REACH_N for trace in (program, clipped))
 
 
+@pytest.mark.slow
 def test_with_the_printed_rows_clipping_loses_the_wall() -> None:
     """30.2 N unchecked, 0.2 N below the reach: noise clips rotors, and what clipping leaves is no level flight."""
     program, printed = press(30.2, 0.3, False), press(30.2, 0.3, False, law="paper", printed=True)
@@ -117,13 +121,14 @@ def test_with_the_printed_rows_clipping_loses_the_wall() -> None:
     assert not printed.claimed and "crash" in printed.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "push", "friction", "slide_s", "limit"),
     [
         ("qp", 22.0, 0.3, 5.0, 15.8),
         ("qp", 16.0, 0.8, 9.0, 8.7),
-        pytest.param("paper", 22.0, 0.3, 5.0, 15.8, marks=pytest.mark.slow),
-        pytest.param("paper", 16.0, 0.8, 9.0, 8.7, marks=pytest.mark.slow),
+        ("paper", 22.0, 0.3, 5.0, 15.8),
+        ("paper", 16.0, 0.8, 9.0, 8.7),
     ],
 )
 def test_a_sliding_push_beyond_reach_is_reduced_with_the_reason(

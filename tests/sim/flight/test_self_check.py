@@ -78,6 +78,7 @@ def test_a_force_sensor_in_wrong_axes_is_named_before_the_tare(order: list[int],
     assert not pilot.estimator.tared and not pilot.self_check.passed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "sign"), AXES)
 def test_a_zeroed_force_sensor_in_wrong_axes_is_named_at_the_first_touch(order: list[int], sign: float) -> None:
     pilot, names = found(2500, zeroed(of_wrench(order, sign)))
@@ -91,6 +92,7 @@ def test_switched_off_it_names_nothing() -> None:
     assert found(50, of_imu, enabled=False)[1] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 @pytest.mark.parametrize("world", ["ideal", "datasheet", "harsh"])
 def test_right_axes_pass_in_every_world(world: str, law: str) -> None:
@@ -117,6 +119,7 @@ def test_a_turned_force_sensor_ends_the_job_by_name_before_the_touch(law: str) -
     assert " deg about x against the vehicle's settings" in trace.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["datasheet", "harsh"])
 def test_the_load_of_a_right_sensor_is_no_turn_in_20_flights(world: str) -> None:
     scene = dataclasses.replace(near_wall(), errors=world_errors(world))

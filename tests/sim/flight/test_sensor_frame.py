@@ -16,6 +16,7 @@ from sim.flight.surroundings import World
 NAN3, NAN6 = np.full(3, np.nan), np.full(6, np.nan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "broken",
     [

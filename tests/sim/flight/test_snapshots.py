@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 
 import numpy as np
+import pytest
 
 from ibvs_qp.pilot import Pilot
 from sim.experiments.scenes import short_job
@@ -15,6 +16,7 @@ TICKS = 300
 PHASES = ("approach", "align", "press", "paint", "climb", "retreat")
 
 
+@pytest.mark.slow
 def test_every_phase_of_a_job_continues_in_a_new_pilot() -> None:
     scene, options = short_job(0.3, rows=2), FlightOptions(features="geometric", video=False)
     config = pilot_config(scene, options)

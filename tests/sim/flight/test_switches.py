@@ -68,6 +68,7 @@ def steps(request: pytest.FixtureRequest) -> dict[str, float]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("switch", "bound"), [(name, bound) for name, _, _, bound in SWITCHES])
 def test_no_switch_makes_the_thrusts_jump(steps: dict[str, float], switch: str, bound: float) -> None:
     assert steps["settle"] <= RATE_STEP + 1e-9
@@ -79,6 +80,7 @@ def test_no_switch_makes_the_thrusts_jump(steps: dict[str, float], switch: str, 
 PHASES = {"approach": RATE_STEP, "align": 0.6, "press": 1.5, "paint": 0.6, "retreat": RATE_STEP, "done": 0.5}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_no_phase_and_no_fault_of_a_whole_flight_makes_the_thrusts_jump(law: str) -> None:
     """Free flight, approach, contact, slide with a rotor that weakens on the way, and off the wall again."""

@@ -57,6 +57,7 @@ def flown() -> Trace:
     return fly(scene, FlightOptions(features="geometric", video=False))
 
 
+@pytest.mark.slow
 def test_figures_of_a_real_flight_survive(flown, tmp_path):
     again, kb_s = stored(flown, tmp_path)
     assert kb_s <= MOST_KB_S

@@ -40,6 +40,7 @@ def slide(trim_deg: float, law: str = "qp") -> Trace:
     return fly(scene, options, config=config, job=PressJob(hold_s=3.0, slide_s=5.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["qp", "paper"])
 def test_two_degrees_deliver_what_level_flight_cannot(law: str) -> None:
     figures = slide_figures(slide(2.0, law))
@@ -48,10 +49,12 @@ def test_two_degrees_deliver_what_level_flight_cannot(law: str) -> None:
     assert figures["tilt_peak_deg"] < 3.5 and figures["stuck_share"] < 0.1
 
 
+@pytest.mark.slow
 def test_level_flight_does_not() -> None:
     assert slide_figures(slide(0.0))["force_error_rms_n"] > 1.0
 
 
+@pytest.mark.slow
 def test_the_explanation_states_what_the_tilt_buys() -> None:
     trace = slide(2.0)
     begin, end = phase_window(trace, "paint")

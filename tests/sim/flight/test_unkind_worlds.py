@@ -31,7 +31,8 @@ def one_error(section: str, **values: float) -> WorldErrors:
     return dataclasses.replace(ideal, **{section: dataclasses.replace(getattr(ideal, section), **values)})
 
 
-@pytest.mark.parametrize("law", ["qp", pytest.param("paper", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["qp", "paper"])
 @pytest.mark.parametrize(
     "errors",
     [
@@ -49,6 +50,7 @@ def test_one_large_error_neither_keeps_the_tip_off_the_wall_nor_spoils_the_push(
         assert metrics["path_rms_straight_m"] < (2e-3 if law == "qp" else 4e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("world", "path_m", "push_n", "peak", "tilt_deg"),
     [("datasheet", 6e-3, 0.25, 1.5, 1.3), ("harsh", 1.2e-2, 0.8, 2.5, 3.0)],
@@ -65,6 +67,7 @@ def test_a_world_is_painted_in(world: str, path_m: float, push_n: float, peak: f
         assert metrics["contact_share"] >= 0.99 and metrics["tilt_rms_deg"] < tilt_deg
 
 
+@pytest.mark.slow
 def test_motors_slower_than_believed_cost_little_with_the_estimated_angular_rate() -> None:
     """Half as slow again: the rate that damps rotation comes from the motors' model above 12.5 Hz."""
     slow = PlantScene(motor_lag_up_s=0.0675, motor_lag_down_s=0.105)
@@ -73,7 +76,8 @@ def test_motors_slower_than_believed_cost_little_with_the_estimated_angular_rate
     assert metrics["path_rms_straight_m"] < 4e-3 and metrics["tilt_rms_deg"] < 1.2
 
 
-@pytest.mark.parametrize("world", ["datasheet", pytest.param("harsh", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("world", ["datasheet", "harsh"])
 def test_the_analytic_law_is_at_its_place_in_every_world(world: str) -> None:
     metrics = compute_metrics(flown(world_errors(world), "paper"))
     assert abs(metrics["place_error_m"]) <= PLACE_M
@@ -84,6 +88,7 @@ def test_the_analytic_law_is_at_its_place_in_every_world(world: str) -> None:
     assert metrics["force_rms_straight_n"] < 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("down_m", [-0.005, 0.005])
 def test_a_tip_that_is_not_where_it_should_be_is_learnt_from_the_paint_in_the_first_row(down_m: float) -> None:
     front, right, down = ibvs_qp.preset("qp").controller.vehicle.tip_position_m  # believed

@@ -65,6 +65,7 @@ class Window:
         self.closed += 1
 
 
+@pytest.mark.slow
 def test_the_window_sees_the_flight_and_its_paint_and_changes_nothing(monkeypatch) -> None:
     import mujoco.viewer
 

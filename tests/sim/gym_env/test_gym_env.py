@@ -183,6 +183,7 @@ def test_reward_of_a_perfect_tour_and_of_a_dab_elsewhere() -> None:
     assert terms["paint"] == 0.0 and terms["stray"] < 0.0 and terms["path"] == -weights.path * TICK_S
 
 
+@pytest.mark.slow
 def test_example_prints_a_row_of_every_policy() -> None:
     command = [sys.executable, str(ROOT / "examples" / "gym_policies.py"), "0.2"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180)

@@ -120,6 +120,7 @@ def test_a_weight_weighs_the_rows_that_the_page_gives_it_and_no_other() -> None:
     assert all(before[name] > 0.0 for name in before if not name.startswith("line_2")), "a row that no test sees"
 
 
+@pytest.mark.slow
 def test_a_price_and_a_switch_are_those_of_their_rows() -> None:
     full = packed(CONFIG)
     for limit in LIMITS.values():
@@ -136,6 +137,7 @@ def test_a_price_and_a_switch_are_those_of_their_rows() -> None:
             assert value == pytest.approx(2.0 if slack.removeprefix("slack_") in names else 1.0)
 
 
+@pytest.mark.slow
 def test_a_bound_moves_the_rows_that_the_page_gives_it_and_no_other() -> None:
     @functools.cache
     def bounds(config: ControllerConfig, tick: int) -> np.ndarray:

@@ -49,6 +49,7 @@ def page(traces, tmp_path_factory):
     return folder.report.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_report_loads_no_external_resource(page):
     assert not re.search(r"(?:src|href)\s*=\s*[\"'](?!data:|video\.mp4)", page)
     assert "http://" not in page and "https://" not in page and "<script" not in page and "@import" not in page
@@ -62,6 +63,7 @@ def test_report_is_complete(page):
     assert "a&lt;b&gt;.toml" in page and "<b>.toml" not in page
 
 
+@pytest.mark.slow
 def test_figures_are_wide_enough_to_read(traces, tmp_path):
     for _, file in draw_all({"qp": traces["qp"]}, tmp_path).values():
         height, width = cv2.imread(str(file)).shape[:2]
@@ -81,6 +83,7 @@ def test_figures_of_a_flight_that_ended_before_touching(tmp_path):
     assert len(draw_all({"qp": trace}, tmp_path)) == len(FIGURES)
 
 
+@pytest.mark.slow
 def test_figures_leave_global_settings_alone(traces, tmp_path):
     import matplotlib
 
@@ -89,6 +92,7 @@ def test_figures_leave_global_settings_alone(traces, tmp_path):
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.slow
 def test_report_plays_the_video_beside_it(traces, tmp_path):
     folder = RunFolder(tmp_path)
     metrics = {law: compute_metrics(trace) for law, trace in traces.items()}

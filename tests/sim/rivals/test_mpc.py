@@ -138,6 +138,7 @@ class SteadyVehicle:
         return seen, Reference(standoff=0.3, lines=line_references(2, depth))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [(0.0, 2.0, 0.0), (0.0, 0.0, 3.0)], ids=["right", "down"])
 def test_a_constant_force_leaves_no_offset(force):
     vehicle = SteadyVehicle(MpcController(ControllerConfig()), np.array(force))

@@ -102,6 +102,7 @@ def test_a_log_keeps_the_rate(value: float | None) -> None:
     assert (back.height_rate, back.height_rate_stamp_ns) == (value, given.height_rate_stamp_ns)
 
 
+@pytest.mark.slow
 def test_a_flight_with_a_barometer_replays_to_the_bit(tmp_path: Path) -> None:
     subject, inputs = flown("rotor_loss", "pilot")
     with Recorder(tmp_path / "a.mcap", subject) as recorder:
@@ -146,6 +147,7 @@ def last_second(trace: Trace) -> tuple[float, float]:
     return float(sink.max()), float(np.abs(estimate - sink).max())
 
 
+@pytest.mark.slow
 def test_a_blind_descent_ends_more_gently_with_a_barometer() -> None:
     without, fitted = descent(), descent(fitted=True)
     assert fitted.reason == LANDED

@@ -68,6 +68,7 @@ def rim_of(camera: PlaneCamera, pose) -> np.ndarray:
     return picture > 0
 
 
+@pytest.mark.slow
 @needs_gl
 @pytest.mark.parametrize("pose", POSES)
 @pytest.mark.parametrize("clutter", [0, 6])

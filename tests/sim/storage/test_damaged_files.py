@@ -37,6 +37,7 @@ def test_logs_with_edits(tmp_path: Path, runs: file_fuzz.Runs, name: str, edits:
     runs.check_edited(tmp_path, runs.flown, name, edits)
 
 
+@pytest.mark.slow
 @BOUNDED
 @given(st.data())
 def test_logs_with_other_arrays(tmp_path: Path, runs: file_fuzz.Runs, data: st.DataObject) -> None:

@@ -135,6 +135,7 @@ def real(seed: int) -> Run:
     return Run(experiment="test", variant="standard", params={}, plan=plan, measure=press_figures)
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_table_to_the_bit(tmp_path):
     runs = [real(0), real(1)]
     alone, apart = (run_sweep(runs, tmp_path / str(count), workers=count).table for count in (1, 2))

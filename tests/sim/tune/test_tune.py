@@ -91,6 +91,7 @@ def searched(trials: int, storage: str, **changes):
     return finished(study)
 
 
+@pytest.mark.slow
 def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
     trials = searched(80, "a.log")
     gains, shipped = trials[0]
@@ -103,6 +104,7 @@ def test_the_search_begins_at_the_shipped_gains_and_betters_them(flown):
         assert all(0.999 * low <= gains[name] <= 1.001 * high for name, (low, high) in GAIN_RANGES.items())
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_search_and_a_resumed_one_too(flown):
     once, again = searched(START + 4, "a.log"), searched(START + 4, "b.log")
     assert once == again
@@ -113,6 +115,7 @@ def test_the_same_seed_is_the_same_search_and_a_resumed_one_too(flown):
     assert searched(4, "d.log", seed=1)[3] != once[3]
 
 
+@pytest.mark.slow
 def test_a_killed_trial_leaves_no_trace_in_the_search(flown, monkeypatch):
     whole, once = sim.sweep.flying.fly, searched(GENERATIONS, "a.log")
 
@@ -236,6 +239,7 @@ def test_the_rule_of_choice():
     assert stuck.ratio(0.0, 0.005) == pytest.approx(0.5), "half a per cent is the least difference that matters"
 
 
+@pytest.mark.slow
 def test_command_writes_preset_trials_figures_and_verdict(flown, capsys):
     words = ["tune", "--trials", "24", "--unseen", "4", "--json", "--out", "run"]
     assert main(words) == 0
@@ -287,6 +291,7 @@ def test_a_journal_gives_the_same_choice_without_the_flights_of_the_search(flown
     assert {name: again[name] for name in same} == {name: once[name] for name in same}
 
 
+@pytest.mark.slow
 def test_a_trial_that_rings_more_is_no_finalist(flown, monkeypatch, tmp_path):
     trials = searched(24, "a.log")
     wanted = plan(24, "a.log")

@@ -22,6 +22,7 @@ def traces():
     return {law: synthetic_trace(scene=SCENE, law=law) for law in ("qp", "paper")}
 
 
+@pytest.mark.slow
 def test_video_shows_both_laws_for_the_whole_flight_in_a_form_that_browsers_play(traces, tmp_path):
     write_video(traces, tmp_path / "video.mp4")
     with av.open(str(tmp_path / "video.mp4")) as container:

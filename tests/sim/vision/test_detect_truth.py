@@ -26,11 +26,11 @@ def run(family: str, count: int, first: int = 0) -> Errors:
     return measure_family(scenes, lambda truth: OwnMethod().detect(truth.frame, truth.seed))
 
 
-@pytest.mark.parametrize("count", [pytest.param(3, id="quick"), pytest.param(20, id="all", marks=pytest.mark.slow)])
-def test_edges_are_found_to_a_fraction_of_a_pixel(count: int) -> None:
+@pytest.mark.slow
+def test_edges_are_found_to_a_fraction_of_a_pixel() -> None:
     total = Errors()
     for family in CLEAR:
-        errors = run(family, count)
+        errors = run(family, 20)
         assert not any(confidence >= 0.8 for confidence in errors.wrong), (family, errors.wrong)
         assert not errors.refused, errors.refused
         total.pool(errors)
@@ -40,6 +40,7 @@ def test_edges_are_found_to_a_fraction_of_a_pixel(count: int) -> None:
     assert np.median(total.chi_square) < 6.0, "covariance claims more than is true (1.4 expected)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["hard", "thin board"])
 def test_what_depth_cannot_tell_is_never_wrong_and_sure(family: str) -> None:
     errors = run(family, 3)

@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import Perception, VisionConfig
@@ -48,6 +49,7 @@ def _signatures_around_pictures() -> tuple[dict[str, int], dict[str, int]]:
     return before, _signatures()
 
 
+@pytest.mark.slow
 def test_no_picture_waits_for_a_compiler() -> None:
     """An argument of another type (an integer, a picture that must not be written) would compile a kernel in flight.
 
@@ -77,6 +79,7 @@ print(kernel(2.0), sum(kernel.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 def test_a_clock_behind_the_files_compiles_once_and_an_edit_compiles_again(tmp_path: Path) -> None:
     """A board without a battery-backed clock starts in the past; the part's own file is not watched by numba."""
     kernel, part = tmp_path / "some_kernel.py", tmp_path / "some_part.py"

@@ -62,6 +62,7 @@ def test_normals_of_an_oblique_plane_are_exact() -> None:
         assert angle.max() < 1.0 and np.median(angle) < 0.1  # depth comes in numbers of 0.1 mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "low_contrast", "dark_board"])
 @pytest.mark.parametrize("stride", [1, 2])
 def test_bottom_edge_of_clean_frames(name: str, stride: int) -> None:

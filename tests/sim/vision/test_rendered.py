@@ -37,6 +37,7 @@ SCENES = [
 FRAMES = 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "board"), SCENES)
 def test_approach(name: str, board: dict) -> None:
     world = World(scene_of(name, **board), 1)
@@ -86,6 +87,7 @@ def test_an_edge_that_leaves_the_picture_fades_at_its_place_and_does_not_jump_to
     assert len(errors) > 15 and max(np.abs(errors)) < 1.0, errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "board"), SCENES)
 def test_row_1_in_contact(name: str, board: dict) -> None:
     world = World(scene_of(name, **board), 2)

@@ -59,6 +59,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scene", "kind", "share"), CASES)
 def test_edges_of_board_and_paint_are_seen_in_uneven_light(scene: str, kind: str, share: float) -> None:
     world, start, flight = row_1(scene, kind, share)

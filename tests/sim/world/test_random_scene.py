@@ -42,6 +42,7 @@ def test_every_start_is_before_the_board_and_above_the_ground():
         assert x <= -RANGES["start.distance_m"].low and down <= -0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", RANGES)
 def test_numbers_fill_their_range_with_the_unit_of_the_setting(path):
     span = RANGES[path]

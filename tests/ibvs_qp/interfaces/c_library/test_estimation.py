@@ -72,6 +72,7 @@ def differences(own: CFlight, ticks: Sequence[PilotTick]) -> dict[str, float]:
     return largest
 
 
+@pytest.mark.slow
 def test_a_recorded_flight_gives_the_estimates_and_thrusts_of_python() -> None:
     ticks = recorded_flight(CASE)
     largest = differences(flight_instance(CASES[CASE].config()), ticks)

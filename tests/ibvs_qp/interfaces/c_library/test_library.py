@@ -67,10 +67,12 @@ def test_a_recorded_flight_gives_the_thrusts_of_python() -> None:
     assert differences("press_beyond_reach", single=False)[0].max() <= DOUBLE_N
 
 
+@pytest.mark.slow
 def test_a_recorded_flight_in_single_precision_gives_the_thrusts_of_python() -> None:
     assert differences("press_beyond_reach", single=True)[0].max() <= FLOAT_N
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_may_tilt_at_its_limits_has_the_thrusts_of_python() -> None:
     found, sound = differences("press_beyond_reach", single=False, trim_deg=2.0)
     assert found[:sound].max() <= DOUBLE_N and found.max() <= AFTER_OTHER_N
@@ -95,6 +97,7 @@ def test_six_flights_in_single_precision_give_the_thrusts_of_python(case: str) -
     assert sound == len(found) or found.max() <= (LOST_FLOAT_N if case == "rotor_loss" else AFTER_OTHER_FLOAT_N)
 
 
+@pytest.mark.slow
 def test_gains_change_at_run_time_and_bad_ones_are_refused() -> None:
     gains = dataclasses.replace(CONFIG.gains, attitude_kp=30.0, force_kfi=0.0, line_ki=0.0, velocity_ki=1.0)
     other, own = HybridController(dataclasses.replace(CONFIG, gains=gains)), instance(CONFIG)
@@ -188,6 +191,7 @@ def test_a_refused_entry_is_named_and_replaced_as_in_python(changes: dict[str, A
         np.testing.assert_allclose(np.array(other.thrusts), command.thrusts, atol=DOUBLE_N)
 
 
+@pytest.mark.slow
 def test_nothing_is_allocated_or_printed() -> None:
     folder = written(CONFIG, True, "", EstimationConfig())
     make(folder, "build/libibvs_qp.a", "CFLAGS=-O1")

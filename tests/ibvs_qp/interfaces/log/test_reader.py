@@ -81,6 +81,7 @@ def test_what_is_no_log_is_refused_with_its_reason(tmp_path: Path, good: bytes) 
         assert reason in refused(written(file, facts, [("/controller/input", b"{}" * 100)], CompressionType.ZSTD))
 
 
+@pytest.mark.slow
 def test_a_log_cut_anywhere_is_read_up_to_there_or_refused(tmp_path: Path, good: bytes) -> None:
     ticks = []
     for ratio in np.linspace(0.0, 1.0, 40):

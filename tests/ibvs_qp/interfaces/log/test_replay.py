@@ -23,6 +23,7 @@ from sim.commands.cli import main
 from tests.replay.cases import CASES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pilot", "controller", "assured"])
 @pytest.mark.parametrize("case", ["rotor_loss", "broken_inputs", "paint_paper_law"])
 def test_replays_to_the_bit(tmp_path: Path, case: str, kind: str) -> None:
@@ -92,6 +93,7 @@ def test_encoding_later_changes_nothing(tmp_path: Path, monkeypatch: pytest.Monk
         assert result.same and result.ticks == 900, (kind, result)
 
 
+@pytest.mark.slow
 def test_other_controllers_differ_and_say_where(tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", "press_beyond_reach", "pilot", 1700)
     flight, config = read_log(tmp_path / "a.mcap"), CASES["press_beyond_reach"].config()

@@ -51,6 +51,7 @@ def strings(value: Any) -> Iterator[str]:
         yield value
 
 
+@pytest.mark.slow
 def test_topics_and_fields_are_those_of_viewers_and_layout(log: Path) -> None:
     messages = logged(log)
     counts, latest = Counter(topic for topic, _ in messages), dict(messages)

@@ -88,6 +88,7 @@ def test_from_rest_to_flight(world: World) -> None:
     assert world.bridge.status.phase == "start" and world.bridge.status.safety.startswith("nominal")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", ["imu", "attitude", "wrench", "color", "depth", "camera_info", MODE])
 def test_every_input_is_needed_before_and_only_inertial_data_and_mode_in_flight(world: World, role: str) -> None:
     assert world.go(400, silent={role}) is WAITING and world.sent(ALIVE) == []

