@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,10 @@ import pytest
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")  # small matrices, and workers side by side
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # of a shell's background job; processes of tests inherit it
+    with contextlib.suppress(ValueError):  # in another thread
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if sys.dont_write_bytecode and "PYTHONPYCACHEPREFIX" not in os.environ:  # every child would compile all sources anew
     sys.dont_write_bytecode, sys.pycache_prefix = False, str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")

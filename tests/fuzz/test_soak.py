@@ -25,14 +25,20 @@ TICKS = int(os.environ.get("IBVS_QP_SOAK_TICKS", "1000000"))
 WARM_UP, HOSTILE = 0.2, 0.2
 #: Growth that is allowed: of resident memory [bytes], of objects of Python, and of the time per tick.
 MEMORY, BLOCKS, TIME = 1_000_000, 2_000, 1.15
+#: Parts of the soak between two measurements: a leak shows in each, a larger heap after one large array in one.
+PARTS = 10
 #: Percentile of the times per tick that other processes do not change.
 UNDISTURBED = 25
-STATM = Path("/proc/self/statm")
+STATUS = Path("/proc/self/status")
 
 
 def resident() -> int:
+    """Memory of the process's own [bytes], swapped parts included; pages of libraries come and go."""
     gc.collect()
-    return int(STATM.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if STATM.exists() else 0
+    if not STATUS.exists():
+        return 0
+    rows = dict(line.split(":", 1) for line in STATUS.read_text().splitlines())
+    return 1024 * sum(int(rows[name].split()[0]) for name in ("RssAnon", "VmSwap"))
 
 
 def fly(flight: Flight, hostile: bool) -> None:
@@ -66,14 +72,16 @@ def slowdown(old: Flight, new: Flight) -> float:
 def soak(subject: Subject, ticks: int) -> None:
     """The recorded ticks again and again under one clock that goes on, a fifth of them hostile."""
     mutator, choices = Mutator(random.Random(0), lies=True), random.Random(1)
-    flight, begin = Flight(subject, mutator), (0, 0)
+    flight, held = Flight(subject, mutator), []
+    marks = {round((WARM_UP + (1.0 - WARM_UP) * part / PARTS) * ticks) for part in range(PARTS)}
     for tick in range(ticks):
-        if tick == round(WARM_UP * ticks):
-            begin = resident(), sys.getallocatedblocks()
+        if tick in marks:
+            held.append((resident(), sys.getallocatedblocks()))
         fly(flight, choices.random() < HOSTILE)
-    memory, blocks = resident() - begin[0], sys.getallocatedblocks() - begin[1]
+    held.append((resident(), sys.getallocatedblocks()))
+    memory, blocks = (PARTS * float(median) for median in np.median(np.diff(held, axis=0), axis=0))
     slower = slowdown(flight, Flight(subject, mutator, subject.make()))
-    print(f"{ticks} ticks: {memory} bytes and {blocks} objects more, {slower:.2f} of the time of a new one")
+    print(f"{ticks} ticks: {memory:.0f} bytes and {blocks:.0f} objects more, {slower:.2f} of the time of a new one")
     assert memory < MEMORY and blocks < BLOCKS
     assert slower < TIME
 
