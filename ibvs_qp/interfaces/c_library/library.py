@@ -92,7 +92,9 @@ def _check(config: ControllerConfig, single: bool) -> None:
             f"vehicle.geometry: {count} rotors in single precision are refused: rounding moves thrusts that share a "
             f"wrench by more than 0.2 N a tick; export it in double precision, or a vehicle of {WRENCH} rotors"
         )
-    hessian = np.asarray(HybridController(config).program(_AT_REST).P)[:count, :count]
+    solver = dataclasses.replace(config.solver, backend="python")  # one program is not worth a compilation
+    law = HybridController(dataclasses.replace(config, solver=solver))
+    hessian = law.program(_AT_REST).P[:count, :count]
     if (condition := np.linalg.cond(hessian)) > SINGLE_CONDITION:
         raise ConfigError(
             f"vehicle: the condition {condition:.1e} of the program's Hessian is refused in single precision (at most "
