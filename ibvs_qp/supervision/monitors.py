@@ -253,7 +253,7 @@ class PushMonitor:
         """As before the flight."""
         self._high.reset()
         self._unfelt.reset()
-        self._reference, self._since = 0.0, 0.0
+        self._references: list[tuple[float, float]] = []  # times [s] and values [N]
         self._mean, self._wind, self._free_wind, self._time = 0.0, 0.0, 0.0, 0.0
 
     def update(self, tick: Tick, response: Setpoints, time_s: float) -> None:
@@ -286,9 +286,13 @@ class PushMonitor:
 
     def _recent(self, reference: float, time_s: float) -> float:
         """Largest reference while the push may still follow it [N]."""
-        if reference >= self._reference or time_s - self._since > RELEASE_S:
-            self._reference, self._since = reference, time_s
-        return self._reference
+        recent = self._references  # falling values, the oldest first
+        while recent and recent[-1][1] <= reference:
+            recent.pop()
+        recent.append((time_s, reference))
+        while time_s - recent[0][0] > RELEASE_S:
+            recent.pop(0)
+        return recent[0][1]
 
 
 class WallMonitor:

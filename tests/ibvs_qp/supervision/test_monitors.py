@@ -70,6 +70,19 @@ def test_a_fault_is_found_in_time_and_alone(
     assert set(found) == {fault} and found[fault] <= latest_s
 
 
+@pytest.mark.parametrize("pressed_ticks", range(150, 300, 10))
+def test_a_hard_push_may_follow_its_reference_down(pressed_ticks: int) -> None:
+    """The reference falls slowly, as the reach does: its largest value of the release is not long ago at any end."""
+    released = BEGIN + pressed_ticks
+
+    def change(number: int) -> dict[str, Any]:
+        reference = 14.0 - 0.002 * (number - BEGIN) if number < released else 0.0
+        push = min(14.0, 14.0 * math.exp(-(number - released) * TICK_NS * 1e-9 / 0.25))
+        return {"push_reference": reference, "contact": CONTACT._replace(push=push)}
+
+    assert first_found(change, ticks=pressed_ticks + 100) == {}
+
+
 def test_a_contact_that_is_not_found_again_is_a_fault_after_a_while() -> None:
     found = first_found(
         lambda number: {"contact": CONTACT._replace(in_contact=False, distance=0.005, push=0.0)}, ticks=1400
