@@ -45,8 +45,9 @@ def _is_sound(contact: ContactState) -> bool:
         return False
     if not known and others[DEPTH] == distance == math.inf:
         distance = others[DEPTH] = 0.0
-    if not all([abs(value) <= CONTACT_BOUND for value in (*normal, known, distance, *others)]):
-        return False  # before the length: an integer may have none
+    numbers = *normal, known, distance, *others
+    if not (-CONTACT_BOUND <= min(numbers) and max(numbers) <= CONTACT_BOUND) or math.isnan(sum(numbers)):
+        return False  # a NaN may hide from min and max, not from the sum; before the length: an integer may have none
     return abs(math.hypot(*normal) - 1.0) <= UNIT_TOLERANCE
 
 

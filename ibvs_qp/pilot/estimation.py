@@ -93,7 +93,7 @@ class Estimation:
 
     def _missing(self, frame: SensorFrame) -> set[str]:
         """Inertial sensors that fail, or whose stamps are too old."""
-        missing = {name for name in INERTIAL if name in self._gate.replaced}
+        missing = self._gate.replaced.intersection(INERTIAL)
         oldest = frame.stamp_ns - round(1e9 * self._config.safety.imu_age_s)
         if frame.attitude_stamp_ns is not None and frame.attitude_stamp_ns < oldest:
             missing.add(INERTIAL[0])

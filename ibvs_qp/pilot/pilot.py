@@ -320,7 +320,7 @@ class Pilot(Rebuilt):
         """Self-check with the raw sensors of the tick; returns the findings."""
         now, missing, check = self._gate.last, self._gate.replaced, self.self_check
         inertial = force = None
-        if not any(name in missing for name in INERTIAL):
+        if missing.isdisjoint(INERTIAL):
             inertial = now["attitude"], now["angular_velocity"], now["specific_force"]
         if "wrench" not in missing:
             force, noted = frame.wrench[:3].tolist(), check.note
@@ -332,13 +332,15 @@ class Pilot(Rebuilt):
 
     def _command(self, stamp_ns: int, contact: ContactState | None) -> Command:
         """Command of the law, or of the supervisor where it replaces the law."""
-        law, measurement, reference = self.controller, self.measurement, self.reference
-        step: Callable[..., Command] = law.step
-        if contact is not None and getattr(step, "__func__", None) is CheckedLaw.step:
-            step = functools.partial(step, trusted=True)  # its numbers were checked in the frame
-        command, fixed = self.supervision.command(
-            lambda: step(measurement, reference, contact), law.setpoints, stamp_ns
-        )
+        measurement, reference = self.measurement, self.reference
+        law: Any = self.controller
+
+        def answer() -> Command:
+            if contact is not None and getattr(law.step, "__func__", None) is CheckedLaw.step:
+                return law.answer(measurement, reference, contact, trusted=True)  # checked in frame and strategy
+            return law.step(measurement, reference, contact)
+
+        command, fixed = self.supervision.command(answer, law.setpoints, stamp_ns)
         if self.observer is not None:
             self.observer(LawCall(measurement, reference, contact, fixed, command))
         return command
@@ -350,7 +352,7 @@ class Pilot(Rebuilt):
             faults[Fault.FILTER_REFUSES] = f"camera velocity refused for {motion.refused_s:.1f} s"
         if estimator.lost:
             faults[Fault.NO_ATTITUDE] = "by motors' model and camera, too uncertain"
-        sampled = not any(name in self._gate.replaced for name in INERTIAL)
+        sampled = self._gate.replaced.isdisjoint(INERTIAL)
         right, down = motion.state[0:2]
         return Tick(
             stamp_ns=frame.stamp_ns,

@@ -124,6 +124,16 @@ class FieldTable:
             entries[name] = own
         return entries, changes, refused
 
+    def trusted(self, source: Any) -> Entries | None:
+        """Entries of an input whose values are plain; None where one is not within its bounds."""
+        entries: Entries = {}
+        for (field, name, _, short), value in zip(self._rows, self._values(source), strict=True):
+            own = value if value is None else value.tolist() if field.shape else [value]
+            if not (field.optional if own is None else math.hypot(*own) <= short or field.accepts(own)):
+                return None
+            entries[name] = own
+        return entries
+
     def values(self, entries: Entries) -> dict[str, Any]:
         """Plain values of all fields."""
         return {field.name: field.value(entries[field.name]) for field, *_ in self._rows}

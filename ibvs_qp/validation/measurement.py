@@ -108,12 +108,14 @@ class MeasurementGate:
         Returns:
             False, and nothing accepted, where `check` might change anything.
         """
-        entries, changes, _ = self._table.read(measurement, self._last, [])
-        lines, plane, low, high = measurement.lines, measurement.plane, entries["thrust_min"], entries["thrust_max"]
-        largest = sum([abs(line.rho) + line.covariance.trace() for line in lines])  # not finite if one entry is not
-        sound = not changes and largest <= LINE_BOUND and len(lines) <= self._most_lines
-        if not sound or (plane is not None and read_plane(plane) is not plane):
+        entries, lines, plane = self._table.trusted(measurement), measurement.lines, measurement.plane
+        # not finite if one entry is not
+        largest = sum([abs(line.rho) + line.covariance.item(0) + line.covariance.item(3) for line in lines])
+        if entries is None or not largest <= LINE_BOUND or len(lines) > self._most_lines:
             return False
+        if plane is not None and read_plane(plane) is not plane:
+            return False
+        low, high = entries["thrust_min"], entries["thrust_max"]
         if low is not None and high is not None and any(map(gt, low, high)):
             return False
         if not self._measured or not self.clock.follow(measurement.stamp_ns):

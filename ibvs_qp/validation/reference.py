@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.measurement import Reference
 from ibvs_qp.validation.fields import REFERENCE, plain_instance
-from ibvs_qp.validation.geometry import read_line_reference, read_lines
+from ibvs_qp.validation.geometry import LINE_BOUND, read_line_reference, read_lines
 
 
 class ReferenceGate:
@@ -31,6 +31,21 @@ class ReferenceGate:
     def last(self) -> Reference:
         """The reference in force."""
         return Reference(contact=self._contact, lines=self._lines, **REFERENCE.values(self._last))
+
+    def trust(self, reference: Reference) -> bool:
+        """Accept a reference whose caller has made it of checked numbers, as `Pilot`.
+
+        A second fence: bounds of the numbers, finite lines.
+
+        Returns:
+            False, and nothing accepted, where `check` might change anything.
+        """
+        entries, lines = REFERENCE.trusted(reference), reference.lines
+        largest = sum([abs(line.rho) + abs(line.theta) for line in lines])  # not finite if one entry is not
+        if entries is None or not largest <= LINE_BOUND or len(lines) > self._room:
+            return False
+        self._last, self._contact, self._lines = entries, reference.contact, lines
+        return True
 
     def check(self, reference: Any) -> tuple[Reference, tuple[str, ...]]:
         """The new reference if all of it is accepted, otherwise the last one; and the rejections."""

@@ -33,7 +33,7 @@ class SensorGate:
         self._captures.reset()
         self.last = SENSOR_FRAME.fallbacks
         self._stamps: dict[str, int] = {}
-        self.replaced: tuple[str, ...] = ()
+        self.replaced = set[str]()
 
     def check(self, frame: Any) -> tuple[SensorFrame | None, tuple[str, ...]]:
         """A copy of the frame in the pilot's time with rejected sensors replaced, and the rejections.
@@ -47,8 +47,7 @@ class SensorGate:
         if why := self.clock.accept(frame.stamp_ns):
             return None, (f"sensor frame: stamp_ns {why}",)
         rejected: list[str] = []
-        self.last, _, refused = SENSOR_FRAME.read(frame, self.last, rejected)
-        self.replaced = tuple(refused)
+        self.last, _, self.replaced = SENSOR_FRAME.read(frame, self.last, rejected)
         times = {name: self._time(frame, name, row, rejected) for name, row in SENSOR_FRAME.stamps.items()}
         image = self._captures.image(frame.image, rejected)
         features = frame.features

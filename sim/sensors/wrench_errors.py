@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import cross
 from sim.world.errors import ForceTorqueErrors
 from sim.world.random_streams import Normals, stream
 from sim.world.readout import PLACES
@@ -37,7 +38,7 @@ class WrenchErrors:
         self._bias = np.append(errors.bias_n * random_direction(normals, 3), np.zeros(3))
         self._drift = np.append(errors.drift_n_min / _NS_PER_MIN * random_direction(normals, 3), np.zeros(3))
         self._extra_kg = vehicle.tool_mass_kg * errors.tool_mass * normals.take(1)[0]
-        self._arm = np.subtract(vehicle.tool_position_m, vehicle.force_torque_position_m)
+        self._arm = np.subtract(vehicle.tool_position_m, vehicle.force_torque_position_m).tolist()
         self._sigma = np.array([errors.noise_n] * 3 + [errors.noise_nm] * 3)
         self._limit = np.array([errors.overload_n or math.inf] * 3 + [math.inf] * 3)
 
@@ -49,7 +50,7 @@ class WrenchErrors:
             truth: `Plant.truth` at the sample.
             now_ns: Time of the sample.
         """
-        carried = self._extra_kg * truth[_FELT]
-        felt = wrench + np.append(carried, np.cross(self._arm, carried))
+        carried = (self._extra_kg * truth[_FELT]).tolist()
+        felt = wrench + np.array((*carried, *cross(self._arm, carried)))
         read = self._calibration @ felt + self._bias + self._drift * now_ns + self._sigma * self._normals.take(6)
-        return np.clip(read, -self._limit, self._limit)
+        return np.minimum(np.maximum(read, -self._limit), self._limit)

@@ -3,14 +3,17 @@ first attitude."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from controller_scenes import TICK_NS, measured
+from controller_scenes import TICK_NS, line_references, measured
+from references import good_reference
 
 from ibvs_qp.measurement import LineFeature
 from ibvs_qp.validation.measurement import MeasurementGate
+from ibvs_qp.validation.reference import ReferenceGate
 
 FIRST, SECOND = np.arange(6.0), np.arange(6.0) + 10.0
 
@@ -78,3 +81,26 @@ def test_a_trusted_measurement_passes_where_no_check_changes_it(broken: dict[str
         assert str(gate.check(given)) == str((checked, rejected)), "nothing is kept of what is refused"
     later = measured(2, attitude=None, contact_wrench=None, imu_stamp_ns="late")
     assert str(gate.check(later)) == str(twin.check(later)), "both replace by the same values"
+
+
+@pytest.mark.parametrize(
+    ("broken", "trusted"),
+    [
+        ({}, True),
+        ({"push_force": -1.0}, False),
+        ({"standoff": np.inf}, False),
+        ({"velocity": np.full(2, np.nan)}, False),
+        ({"tilt": np.full(2, 0.7)}, False),
+        ({"lines": 2 * line_references(2)}, False),
+        ({"lines": (replace(line_references(1)[0], rho=np.nan),)}, False),
+    ],
+)
+def test_a_trusted_reference_passes_where_no_check_changes_it(broken: dict[str, Any], trusted: bool) -> None:
+    gate, twin, given = ReferenceGate(2), ReferenceGate(2), replace(good_reference(), **broken)
+    assert gate.trust(given) == trusted
+    checked, rejected = twin.check(given)
+    assert (checked is given and rejected == ()) == trusted
+    if trusted:
+        assert str(gate.last) == str(twin.last), "both stay in force where the next one is refused"
+    else:
+        assert str(gate.last) == str(ReferenceGate(2).last), "nothing is kept of what is refused"
