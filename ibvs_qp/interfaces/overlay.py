@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.lines.line_state import TrackState
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
 
 #: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text and its ground.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
-from ibvs_qp.measurement import FeatureFrame, RgbdFrame
+from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
@@ -17,22 +18,105 @@ from ibvs_qp.vision.compilation import prepare
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion, surface_motion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
+from ibvs_qp.vision.flow.velocity import FlowVelocity
 from ibvs_qp.vision.lines.candidates import Candidate, find_candidates
-from ibvs_qp.vision.lines.guides import GuideKeeper
-from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.lines.line_state import GuideKeeper, LineHint, TrackState, no_guides
 from ibvs_qp.vision.lines.segments import half_resolution
-from ibvs_qp.vision.lines.tracks import LineTracker
-from ibvs_qp.vision.perception_result import PerceptionResult, make_result
-from ibvs_qp.vision.picture.exposure import ExposureSteps
-from ibvs_qp.vision.picture.picture import Picture
-from ibvs_qp.vision.surface.layout import PictureLayout
-from ibvs_qp.vision.surface.seeds import UP_LEFT
+from ibvs_qp.vision.lines.tracks import LineTracker, Track
+from ibvs_qp.vision.picture.layout import UP_LEFT, PictureLayout
+from ibvs_qp.vision.picture.picture import ExposureSteps, Picture
+from ibvs_qp.vision.surface.plane import PlaneEstimate
 from ibvs_qp.vision.surface.tracker import SurfaceTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
 #: Half width of the search strips where points of the surface give the camera's motion [px at 640].
 _SURFACE_STRIP_PX = 8.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerceptionResult:
+    """Result of one picture.
+
+    Attributes:
+        features: Lines, plane and velocity for an estimator or a controller.
+        plane: The surface, or None.
+        tracks: All tracks, tentative ones included.
+        guides: Track of the surface's own top, bottom, left and right edge, None where none is in view.
+        candidates: Lines found by a detection in this picture (empty where none ran).
+        refused: Why there is no plane or nothing at all, or None.
+        velocity_refused: Why there is no velocity, or None.
+        mask: Vehicle's mask of this picture, uint8 (H, W), or None.
+        intrinsics: (fx, fy, cx, cy) of this picture [px], or None.
+        time_ms: Wall-clock time per stage [ms].
+    """
+
+    features: FeatureFrame
+    plane: PlaneEstimate | None = None
+    tracks: tuple[TrackState, ...] = ()
+    guides: dict[str, TrackState | None] = field(default_factory=no_guides)
+    candidates: tuple[Candidate, ...] = ()
+    refused: str | None = None
+    velocity_refused: str | None = None
+    mask: np.ndarray | None = None
+    intrinsics: tuple[float, float, float, float] | None = None
+    time_ms: dict[str, float] = field(default_factory=dict)
+
+
+def make_result(
+    frame: RgbdFrame,
+    followed: list[Track],
+    plane: PlaneEstimate | None,
+    flow: FlowVelocity | str,
+    candidates: tuple[Candidate, ...],
+    refused: str | None,
+    mask: np.ndarray,
+    times: dict[str, float],
+    guides: GuideKeeper | None = None,
+    least_confidence: float = 0.0,
+) -> PerceptionResult:
+    """Result of one picture; only confirmed and certain tracks of positive weight become features."""
+    tracks = tuple(track.state() for track in followed)
+    certain = {
+        track.track_id for track in followed if track.confidence >= least_confidence
+    }  # seen or not: weight fades
+    lines = tuple(
+        LineFeature(
+            rho=track.rho,
+            theta=track.theta,
+            covariance=track.covariance,
+            role=track.role,
+            weight=track.weight,
+            stamp_ns=frame.stamp_ns,
+            track_id=track.track_id,
+            segment=track.segment,
+            surface_side=track.surface_side,
+            kind=track.kind,
+        )
+        for track in tracks
+        if track.confirmed and track.weight > 0.0 and track.track_id in certain
+    )
+    moving = flow if isinstance(flow, FlowVelocity) else None
+    features = FeatureFrame(
+        lines=lines,
+        plane=None if plane is None else plane.abcd,
+        stamp_ns=frame.stamp_ns,
+        velocity=None if moving is None else moving.velocity,
+        velocity_covariance=None if moving is None else moving.covariance,
+        velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
+    )
+    return PerceptionResult(
+        features=features,
+        plane=plane,
+        tracks=tracks,
+        guides=no_guides() if guides is None else guides.choose(tracks),
+        candidates=candidates,
+        refused=refused,
+        velocity_refused=None if moving is not None else str(flow),
+        mask=mask,
+        intrinsics=frame.intrinsics,
+        time_ms=times,
+    )
 
 
 class Perception:

@@ -11,7 +11,7 @@ from ibvs_qp.vision.checks import frame_problem
 from ibvs_qp.vision.config import REFERENCE_WIDTH
 from ibvs_qp.vision.lines.candidates import Candidate, on_same_edge
 from ibvs_qp.vision.lines.line_state import TrackState
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
 from sim.detection.detection import DetectedLine, Detection
 from sim.detection.whole_picture import every_line

@@ -10,7 +10,7 @@ import numpy as np
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import REFERENCE_WIDTH, LineConfig
-from ibvs_qp.vision.lines.segments import fit_segments
+from ibvs_qp.vision.lines.refine import fit_segments
 from ibvs_qp.vision.picture.picture import Picture, denormalise, normalise, normalised_line
 from sim.detection.detection import DetectedLine
 from sim.detection.segments import find_segments

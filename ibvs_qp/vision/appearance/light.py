@@ -7,10 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import CELL_BITS, LIGHT_STEP, squared_distance
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics
 
+#: Step between two levels of light [ln]: half of it is a seventh of the gate of a white board.
+LIGHT_STEP = 0.03
+#: Side of a cell of the picture with one level of light, as a power of two [px].
+CELL_BITS = 4
+#: A colour that no other one is near to.
+UNKNOWN = np.full(3, np.inf, np.float32)
 #: Light of samples in which board or paint could be at all, times that in which their colour is known.
 DIMMEST, BRIGHTEST = np.float32(0.4), np.float32(2.5)
 #: Fraction of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
@@ -41,6 +45,13 @@ _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
 _UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
+
+
+def squared_distance(colors: np.ndarray, reference: np.ndarray | None) -> np.ndarray:
+    """Squared RGB distances of colours (..., 3) from a colour (..., 3), float32; infinite from an unknown one."""
+    reference = UNKNOWN if reference is None else reference
+    red, green, blue = (colors[..., k] - reference[..., k] for k in range(3))  # not at once: rows of three are slow
+    return red * red + green * green + blue * blue
 
 
 @dataclass(frozen=True)
@@ -189,16 +200,6 @@ def light_of(
     even = tinted & (squared_distance(colors, np.minimum(board, _WHITE)) < np.float32((_SURE * gate) ** 2))
     even &= np.abs(light - np.float32(1.0)) < np.float32(_UNEVEN)
     return light, cut, tinted, even
-
-
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
-    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, of any colour.
-
-    The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
-    """
-    u, v = (axis.take(places) for axis in grid.pixels)
-    z, design = depth[v, u], grid.design.take(places, axis=0)
-    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
 
 
 def _left_by_two_materials(logarithm: np.ndarray, band: float) -> float:

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
+from ibvs_qp.vision.picture.layout import Intrinsics
 from ibvs_qp.vision.picture.lens import camera_matrix
-from ibvs_qp.vision.picture.mask import Intrinsics
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: Least fraction of the distance to a surface that is left after a motion.

@@ -15,7 +15,7 @@ from ibvs_qp.vision.config import FlowConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
 from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
 from ibvs_qp.vision.medians import upper_median
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: Pyramid levels beyond the first, needed only where the last velocity does not predict the points.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import is_alike
+from ibvs_qp.vision.appearance.colors import is_alike
 from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.picture.picture import Picture
-from ibvs_qp.vision.surface.region import SurfaceRegion, depth_gate
+from ibvs_qp.vision.surface.plane import SurfaceRegion, depth_gate
 
 #: Distances from the line at which depth is read [px at 640]. A depth camera moves a step by up to 20 px.
 _DEPTH_PX = np.array((3.0, 5.0, 8.0, 12.0, 18.0, 26.0, 36.0))

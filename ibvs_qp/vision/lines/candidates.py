@@ -12,10 +12,10 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.lines.borders import PLACES, Borders, places_beside, score_borders
-from ibvs_qp.vision.lines.refine import RefinedLine
-from ibvs_qp.vision.lines.segments import FIT_BEYOND, edge_segments, fit_segments
+from ibvs_qp.vision.lines.refine import FIT_BEYOND, RefinedLine, fit_segments
+from ibvs_qp.vision.lines.segments import edge_segments
 from ibvs_qp.vision.picture.picture import Picture, denormalise
-from ibvs_qp.vision.surface.region import SurfaceRegion, filled
+from ibvs_qp.vision.surface.plane import SurfaceRegion, filled
 
 #: Shortest piece of a segment that is looked at where the surface ends before the segment does [px at 640].
 _SHORTEST_PX = 40.0

@@ -13,11 +13,19 @@ from ibvs_qp.frames import align_line
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
 from ibvs_qp.vision.lines.line_fit import fit_lines
-from ibvs_qp.vision.lines.records import ANY, BORDER, ENDS, LINE, PAINT_EDGE, QUERY, Pixels, Search
-from ibvs_qp.vision.picture.picture import Picture
+from ibvs_qp.vision.lines.strips import ANY, BORDER, ENDS, LINE, PAINT_EDGE, QUERY, Pixels, Search
+from ibvs_qp.vision.picture.picture import Picture, normalise
 
 #: Distance from the edge at which its two sides are looked at [px at 640]: beyond blur, within a 10 mm margin.
 _SIDE_PX = 4.0
+#: Half width of the strip in which a segment is fitted [px at 640].
+_REFINE_PX = 4.0
+#: A segment is fitted beyond its ends by this fraction of its length: detectors stop short.
+FIT_BEYOND = 0.15
+#: Segments fitted in one batch: those of a batch share the number of profiles.
+_BATCH = 8
+#: Polarity of a segment along the normal of its line, which points to the right of the way from end to end.
+_DARKER = -1
 _ANYWHERE, _NO_STEP = (-math.inf, math.inf), np.zeros(3)
 _NO_LABELS, _NO_DEPTH = np.empty(0, np.uint8), np.empty(0, np.float32)
 #: Signs of the covariance of (rho, theta) where rho changes its sign.
@@ -160,3 +168,51 @@ def refine_lines(
         )
         found.append(line)
     return found
+
+
+def fit_segments(
+    segments: np.ndarray,
+    picture: Picture,
+    config: LineConfig,
+    colors: SurfaceColors,
+    beyond: np.ndarray | None = None,
+    contents: bool = False,
+    half_width_px: float | None = None,
+) -> list[RefinedLine | None]:
+    """Sub-pixel fits of segments.
+
+    Args:
+        segments: End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4); the brighter one
+            by the channel that changes most.
+        picture: Colour and camera.
+        config: Settings of the fit.
+        colors: Of the surface.
+        beyond: Fraction of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
+        contents: Whether the colours of both sides are returned.
+        half_width_px: Half width of the strips; 4 px at 640 unless given.
+
+    Returns:
+        One fit for every segment, None where nothing supports one.
+    """
+    shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
+    fx, fy, cx, cy = picture.intrinsics
+    x, y = normalise(segments.reshape(-1, 2, 2), picture.intrinsics).transpose(2, 1, 0)
+    across, down = y[0] - y[1], x[1] - x[0]
+    rho, theta = (across * x[0] + down * y[0]) / np.hypot(across, down), np.arctan2(down, across)
+    queries = []
+    for ends, share, *line in zip(*(each.tolist() for each in (segments, shares, rho, theta)), strict=True):
+        (u1, v1, u2, v2), upright = ends, abs(math.cos(line[1])) > abs(math.sin(line[1]))
+        low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
+        span = low - share * (high - low), high + share * (high - low)
+        queries.append(LineQuery(rho=line[0], theta=line[1], polarity=_DARKER, span=span))
+    fits: list[RefinedLine | None] = []
+    for start in range(0, len(queries), _BATCH):
+        fits += refine_lines(
+            picture,
+            queries[start : start + _BATCH],
+            half_width_px=half_width_px or _REFINE_PX * picture.scale,
+            config=config,
+            colors=colors,
+            contents=contents,
+        )
+    return fits

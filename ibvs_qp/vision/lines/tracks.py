@@ -15,7 +15,7 @@ from ibvs_qp.vision.lines.candidates import Candidate, classify_lines, role_of
 from ibvs_qp.vision.lines.line_state import LineHint, TrackState
 from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
 from ibvs_qp.vision.picture.picture import Picture, denormalise
-from ibvs_qp.vision.surface.region import SurfaceRegion
+from ibvs_qp.vision.surface.plane import SurfaceRegion
 
 #: Fraction of the new step in a track's running colour step.
 _STEP_BLEND = 0.2

@@ -17,9 +17,9 @@ from ibvs_qp.vision.lines.tracks import Track
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
-from ibvs_qp.vision.perception_result import PerceptionResult, make_result
-from ibvs_qp.vision.surface.layout import PictureLayout
-from ibvs_qp.vision.surface.seeds import UP_LEFT, facing
+from ibvs_qp.vision.perception import PerceptionResult, make_result
+from ibvs_qp.vision.picture.layout import UP_LEFT, PictureLayout
+from ibvs_qp.vision.surface.search import facing
 
 #: Identities of the two lines: the paper has no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2

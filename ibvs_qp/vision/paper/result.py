@@ -11,7 +11,7 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.paper.box import SurfaceBox
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics
 from ibvs_qp.vision.picture.picture import normalise, normalised_line
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import alike_colors
-from ibvs_qp.vision.picture.grid import Samples
-from ibvs_qp.vision.surface.region import connected
+from ibvs_qp.vision.appearance.colors import alike_colors
+from ibvs_qp.vision.picture.layout import Samples
+from ibvs_qp.vision.surface.plane import connected
 
 #: Fraction of the surface that must have the colour around the seed for it to be the surface's.
 _GROUND_SHARE = 0.25

@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import BOARD, OTHER
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.compilation import kernel
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import DEPTH_RATIO, CoarseGrid, Seeds
 from ibvs_qp.vision.surface.plane import PlaneEstimate, refit_plane
-from ibvs_qp.vision.surface.seeds import seed_values
 
 #: Samples by which planes are scored; more cost time and change nothing.
 _VOTERS = 400
@@ -225,3 +224,25 @@ def grown_plane(
         sigma = MAD_TO_SIGMA * median(np.abs(residual))
         gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
     return plane
+
+
+def facing(grid: CoarseGrid, depth: np.ndarray, ladder: list[Seeds], config: PlaneConfig) -> list[tuple[int, int]]:
+    """The seeds at which a picture has the depth for which they were laid; without any, those of a contact."""
+    if not ladder:
+        return []
+    cells, gate = [(cell, seeds.depth) for seeds in ladder for cell in seeds.cells], math.sqrt(DEPTH_RATIO)
+    values = seed_values(grid, grid.inverse_depth(depth, config), [cell for cell, _ in cells], config.seed_radius)
+    fitting = [cell for (cell, z), value in zip(cells, values, strict=True) if 1.0 / gate < value * z < gate]
+    return list(dict.fromkeys(fitting)) or ladder[0].cells  # no cell twice, in order
+
+
+def seed_values(grid: CoarseGrid, inverse: np.ndarray, seeds: list[tuple[int, int]], radius: int) -> list[float]:
+    """Upper median 1/Z around every seed [1/m], within a radius [cells]; 0 where too few samples have one."""
+    if not seeds:
+        return []
+    windows, least = grid.windows(seeds, radius), 2 * radius + 1
+    known = inverse.reshape(-1).take(windows)
+    known[~grid.free.reshape(-1).take(windows) | ~(known > 0.0)] = np.inf
+    known.sort(axis=1)
+    counts = np.count_nonzero(known < np.inf, axis=1).tolist()
+    return [float(row[count // 2]) if count >= least else 0.0 for row, count in zip(known, counts, strict=True)]

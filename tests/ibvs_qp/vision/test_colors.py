@@ -7,7 +7,7 @@ import pytest
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SurfaceColors
 from ibvs_qp.vision.appearance.light import light_of
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import CoarseGrid
 
 GATE, WHITE, RED = 42.0, (200, 204, 196), (180, 40, 50)
 SHAPE = (120, 160)

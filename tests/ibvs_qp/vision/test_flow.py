@@ -15,8 +15,7 @@ from ibvs_qp.vision.config import FlowConfig, MaskConfig, VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow, expected_points, information_root, inverse_depths
 from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
-from ibvs_qp.vision.picture.mask import vehicle_mask
-from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.picture.layout import PictureLayout, vehicle_mask
 
 FOCAL, INTERVAL, CONFIG = 150.0, 0.033, FlowConfig()
 INTRINSICS = (FOCAL, FOCAL, 79.5, 59.5)

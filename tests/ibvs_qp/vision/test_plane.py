@@ -10,7 +10,7 @@ import pytest
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.surface.plane import PlaneEstimate, depth_noise, refit_plane
 from ibvs_qp.vision.surface.search import PlaneSearch
 

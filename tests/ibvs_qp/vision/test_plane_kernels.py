@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.appearance.labels import BOARD, PAINT
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.surface.plane import choose_samples, connected_samples, fit_plane, residual_squares
 from ibvs_qp.vision.surface.search import score_planes
 

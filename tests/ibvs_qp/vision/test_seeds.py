@@ -7,8 +7,8 @@ import pytest
 
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.seeds import facing, seeds_ahead
+from ibvs_qp.vision.picture.layout import CoarseGrid, seeds_ahead
+from ibvs_qp.vision.surface.search import facing
 
 SHAPE, INTRINSICS, BRUSH_M = (480, 640), (625.2, 625.2, 319.5, 239.5), 0.08
 

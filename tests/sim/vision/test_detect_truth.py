@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.frames import align_line
-from ibvs_qp.vision.lines.guides import GuideKeeper
-from ibvs_qp.vision.lines.line_state import TrackState
+from ibvs_qp.vision.lines.line_state import GuideKeeper, TrackState
 from sim.detection.own import OwnMethod
 from tests.support.truth import FAMILIES, TruthScene, Variation, render_frame, sample_scene
 from tests.support.truth.accuracy import Errors, line_errors, measure_family
