@@ -89,12 +89,6 @@ class LightField:
         light = products(places / self.reach) @ self.terms
         return np.clip(light, max(self.range[0], -_LEVELS * LIGHT_STEP), min(self.range[1], _LEVELS * LIGHT_STEP))
 
-    def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Level of light at pixels, uint8 of their shape."""
-        height, width = self.shape
-        row = np.clip(np.asarray(v).astype(np.intp), 0, height - 1) >> CELL_BITS
-        return self.levels[row, np.clip(np.asarray(u).astype(np.intp), 0, width - 1) >> CELL_BITS]
-
 
 def products(places: np.ndarray) -> np.ndarray:
     """1, x, y, x^2, x y, y^2 of places (..., 2), (..., 6)."""
@@ -176,17 +170,10 @@ def fit_light(
 def light_of(
     colors: np.ndarray, board: np.ndarray, paint: np.ndarray | None, gate: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """In which light the board would look like each sample.
+    """In which light the board would look like each sample, float32 (n, 3), times the reference's, (n,).
 
-    Args:
-        colors: Samples, float32 (n, 3).
-        board: Colour of the board in the light of the reference, float32 (3,).
-        paint: Colour of the paint or None: samples of it have not the board's tint.
-        gate: Distance within which a colour is the board's in that light.
-
-    Returns:
-        The light, times the reference's; which samples are cut off, which have the board's tint in some light or are
-        cut off, and which of these have its colour in the reference's light, (n,) each.
+    With it, (n,) each: which samples are cut off, which have the board's tint (3,) in some light or are cut off, and
+    which of these have its colour, within the gate, in the reference's light. The paint has not the board's tint.
     """
     (red, green, blue), (b_red, b_green, b_blue) = colors.T, board
     size = max(b_red * b_red + b_green * b_green + b_blue * b_blue, np.float32(1.0))

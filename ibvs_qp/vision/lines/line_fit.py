@@ -8,12 +8,8 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from ibvs_qp.vision.compilation import inner, kernel
+from ibvs_qp.vision.compilation import MAD_TO_SIGMA, inner, kernel, upper_median
 from ibvs_qp.vision.lines.strips import (
-    BY_END,
-    BY_MASK,
-    BY_PICTURE,
-    BY_SPAN,
     LINES,
     PIXELS,
     QUERIES,
@@ -21,6 +17,7 @@ from ibvs_qp.vision.lines.strips import (
     VIEW,
     Strip,
     clamped,
+    end_at,
     find_admissible,
     find_edges,
     gather,
@@ -28,7 +25,6 @@ from ibvs_qp.vision.lines.strips import (
     preferences,
     typical_step,
 )
-from ibvs_qp.vision.medians import MAD_TO_SIGMA, upper_median
 
 #: Pixels of a profile beyond its two sides that must be in the picture.
 _MARGIN = 2
@@ -109,8 +105,8 @@ def finish(view, fit, run, strip, search, theta, line):
     line.segment[1, along], line.segment[1, across] = (u[last] - view.cx) / view.fx, (v2 - view.cy) / view.fy
     line.length_px = math.hypot(u[last] - u[first], v2 - v1)
     margin = search.side + _MARGIN
-    line.ends[0] = _end_at(first - 1, view.cut_first, view, fit, strip, margin)
-    line.ends[1] = _end_at(last + 1, view.cut_last, view, fit, strip, margin)
+    line.ends[0] = end_at(first - 1, view.cut_first, view, fit, strip, margin)
+    line.ends[1] = end_at(last + 1, view.cut_last, view, fit, strip, margin)
     line.inlier_share, line.count, line.rms_px = run.agreeing / max(run.seen, 1.0), run.agreeing, fit.rms
 
 
@@ -135,28 +131,12 @@ def _polar(view, fit, reference, bias, line):
     line.covariance[1, 1] = angle_slope**2 * slope_variance
 
 
-@inner
-def _end_at(neighbour, cut, view, fit, strip, margin):
-    """Why a segment ends before a neighbouring profile; `cut` is whether no more was looked at on that side."""
-    if neighbour < 0 or neighbour >= len(strip.u):
-        return BY_SPAN if cut else BY_PICTURE
-    beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
-    if not margin <= beyond <= view.height - 1.0 - margin:
-        return BY_PICTURE
-    return BY_END if strip.visible[neighbour] else BY_MASK
-
-
 @kernel(nb.void(PIXELS, QUERIES, SEARCH, LINES, nb.u1[:, :, :, ::1], nb.f8[:, :, ::1]))
-def fit_lines(pixels, queries, search, lines, sides, places):
+def fit_profiles(pixels, queries, search, lines, sides, places):
     """Fit L predicted lines, each at K profiles: as many as the shortest of them has columns, up to the most.
 
-    Args:
-        pixels: The picture, `Pixels`.
-        queries: The lines, records of `QUERY`, (L,).
-        search: Settings, `Search`.
-        lines: Filled with the lines, records of `LINE`, (L,).
-        sides: Filled with the colours before and behind the lines, uint8 (L, 2, profiles, 3); left alone if empty.
-        places: Filled with the places of these, (L, profiles, 2) [px]; left alone with the sides.
+    `lines` (L,) is filled; so are the colours before and behind them, `sides`, uint8 (L, 2, profiles, 3), and the
+    places of these, (L, profiles, 2) [px], unless they are empty.
     """
     views, alive, count = np.empty(len(queries), VIEW), np.zeros(len(queries), np.bool_), search.profiles
     for line in range(len(queries)):

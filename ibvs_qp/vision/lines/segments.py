@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from ibvs_qp.vision.compilation import inner, kernel
-from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.picture.picture import Picture, half_resolution
 
 #: Weakest gradient of an edge, over two pixels [grey levels], shortest segment [px at 640], and most of them.
@@ -40,63 +39,24 @@ _LEVELS = 362
 _NORMALS = np.array([(math.cos(math.radians(k)), math.sin(math.radians(k))) for k in range(_ANGLES)]).T.copy()
 
 
-def edge_segments(
-    picture: Picture, grid: CoarseGrid, region: np.ndarray, tilt: float | None, within_deg: float
-) -> np.ndarray:
-    """Straight edges in marked samples, longest first.
+def edge_segments(picture: Picture, region: np.ndarray, within_deg: float) -> np.ndarray:
+    """Straight edges in marked samples, bool (rows, columns), longest first.
 
-    Args:
-        picture: Colour and mask.
-        grid: Where the samples lie.
-        region: The marked ones, bool (rows, columns).
-        tilt: Angle of gravity in the picture from down [rad], None if unknown.
-        within_deg: With a tilt, edges this near to level and upright are looked for [deg].
-
-    Returns:
-        End points u1, v1, u2, v2 [px], the brighter side to the left of the way, (n, 4).
+    Where the tilt is known, edges within an angle [deg] of level and upright alone are looked for. Returns end points
+    u1, v1, u2, v2 [px], the brighter side to the left of the way, (n, 4).
     """
     small, factor = half_resolution(picture.rgb)
     rows, columns = (
-        np.minimum(factor * np.arange(size) // grid.stride, cells - 1)
+        np.minimum(factor * np.arange(size) // picture.grid.stride, cells - 1)
         for size, cells in zip(small.shape[:2], region.shape, strict=True)
     )
     normals = np.ones(_ANGLES, bool)
-    if tilt is not None:
-        normals = np.abs((np.arange(_ANGLES) - math.degrees(tilt) + 45.0) % 90.0 - 45.0) <= within_deg
+    if picture.tilt is not None:
+        normals = np.abs((np.arange(_ANGLES) - math.degrees(picture.tilt) + 45.0) % 90.0 - 45.0) <= within_deg
     shortest = _SHORTEST_PX * picture.scale / factor
-    found = find_segments(small, picture.mask, factor, np.ascontiguousarray(region), rows, columns, normals, shortest)
-    ends = found * factor + 0.5 * (factor - 1)  # pixel centres
-    return ends[np.argsort(-np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]), kind="stable")]
-
-
-def find_segments(
-    small: np.ndarray,
-    mask: np.ndarray,
-    factor: int,
-    region: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
-    normals: np.ndarray,
-    shortest: float,
-) -> np.ndarray:
-    """Segments of a picture, those with most votes first.
-
-    Args:
-        small: The picture, uint8 (h, w, 3).
-        mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
-        factor: Pixels at full resolution per pixel of the picture.
-        region: Cells in which segments are searched, bool.
-        rows: Row of cells of every row of the picture, (h,).
-        columns: The same of its columns, (w,).
-        normals: Directions of the normals to search, by whole degrees, bool (360,).
-        shortest: Least length [px].
-
-    Returns:
-        u1, v1, u2, v2 [px], (n, 4). The brighter side lies to the left of the way from the first end to the second.
-    """
     middle = 0.5 * (small.shape[1] - 1), 0.5 * (small.shape[0] - 1)
     reach, least = int(math.hypot(*middle)) + 2, int(_VOTED * shortest)
-    points = _edge_points(small, mask, factor, region, rows, columns)
+    points = _edge_points(small, picture.mask, factor, np.ascontiguousarray(region), rows, columns)
     degrees = np.rint(np.degrees(np.arctan2(points[:, 3], points[:, 2]))).astype(np.int16) % _ANGLES
     points = points.take(np.argsort(degrees, kind="stable"), axis=0)
     first = np.concatenate(([0], np.cumsum(np.bincount(degrees, minlength=_ANGLES))))
@@ -105,7 +65,8 @@ def find_segments(
     degree, distance = _peaks(votes, max(least, 1))
     segments, used = np.empty((_MOST, 4)), np.zeros(len(points), np.bool_)
     kept = _segments_on(points, first, degree, distance - reach, _NORMALS, least, shortest, middle, used, segments)
-    return segments[:kept]
+    ends = segments[:kept] * factor + 0.5 * (factor - 1)  # pixel centres
+    return ends[np.argsort(-np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]), kind="stable")]
 
 
 @inner

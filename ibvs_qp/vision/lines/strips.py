@@ -9,8 +9,7 @@ import numba as nb
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, label_of, level_at
-from ibvs_qp.vision.compilation import inner
-from ibvs_qp.vision.medians import upper_median
+from ibvs_qp.vision.compilation import inner, upper_median
 
 #: Demands of a line on its two sides: none, paint beside board, border of the surface.
 ANY, PAINT_EDGE, BORDER = range(3)
@@ -41,16 +40,9 @@ VIEW = np.dtype(
         ("row_step", "i8"),  # flat distances of the view's pixels
         ("column_step", "i8"),
         ("height", "i8"),  # [px]
-        ("fx", "f8"),
-        ("fy", "f8"),
-        ("cx", "f8"),
-        ("cy", "f8"),
-        ("slope", "f8"),
-        ("level", "f8"),
-        ("first", "f8"),  # columns to look at
-        ("last", "f8"),
-        ("cut_first", "?"),  # whether the picture goes on before them
-        ("cut_last", "?"),  # whether it does behind them
+        *((name, "f8") for name in ("fx", "fy", "cx", "cy", "slope", "level")),
+        *((name, "f8") for name in ("first", "last")),  # columns to look at
+        *((name, "?") for name in ("cut_first", "cut_last")),  # whether the picture goes on before and behind them
         ("seen", "f8", 2),  # columns in which it was seen last
         ("sign", "f8"),  # +1 if its normal points along +v, else -1
         ("surface_behind", "?"),
@@ -349,12 +341,9 @@ def _largest(answers, k):
 def _peak_near(answers, k, index):
     """Peak of the answers (K, n) of profile k near a whole place.
 
-    The interpolation is that of a Gaussian peak: a blurred step has a Gaussian derivative, on which a parabola would be
-    off by up to 0.03 px.
-
-    Returns:
-        Its place from the middle of the strip [px], the answer at the nearest whole place, and whether a peak could be
-        there: not at the border of the strip.
+    Returns its place from the middle of the strip [px], the answer at the nearest whole place, and whether a peak could
+    be there: not at the border of the strip. The interpolation is that of a Gaussian peak: a blurred step has a
+    Gaussian derivative, on which a parabola would be off by up to 0.03 px.
     """
     middle = min(max(index, 1), answers.shape[1] - 2)
     peak = answers[k, middle]
@@ -381,3 +370,14 @@ def _any_step(colors, k, at):
     """Length of the colours' gradient at a place of profile k [grey levels per px]."""
     red, green, blue = gradient(colors, k, at), gradient(colors, k, at + 1), gradient(colors, k, at + 2)
     return math.sqrt(red * red + green * green + blue * blue)
+
+
+@inner
+def end_at(neighbour, cut, view, fit, strip, margin):
+    """Why a segment ends before a neighbouring profile; `cut` is whether no more was looked at on that side."""
+    if neighbour < 0 or neighbour >= len(strip.u):
+        return BY_SPAN if cut else BY_PICTURE
+    beyond = fit.level + fit.slope * (strip.u[neighbour] - fit.center)
+    if not margin <= beyond <= view.height - 1.0 - margin:
+        return BY_PICTURE
+    return BY_END if strip.visible[neighbour] else BY_MASK

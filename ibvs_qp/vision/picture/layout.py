@@ -25,6 +25,9 @@ _CORNERS, _STATIONS = 48, 40
 _SHIFT = 4
 
 Intrinsics = tuple[float, float, float, float]
+#: A cell of a grid, (row, column) or steps of them; a place in normalised coordinates.
+Cell = tuple[int, int]
+Place = tuple[float, float]
 #: Whole pixels need no table of fractions.
 _WHOLE = np.empty((0, 0), np.uint16)
 #: Types that OpenCV can read at places.
@@ -47,7 +50,7 @@ DEPTH_RATIO, _NEAREST_M, _FARTHEST_M = 1.15, 0.05, 2.6
 def vehicle_mask(
     vehicle: VehicleParams, brush_width_m: float, config: MaskConfig, intrinsics: Intrinsics, shape: tuple[int, int]
 ) -> np.ndarray:
-    """Pixels hidden by the vehicle itself.
+    """Pixels hidden by the vehicle itself, 255 there, uint8 (H, W).
 
     Args:
         vehicle: Geometry of arm, tip, camera and rotors.
@@ -55,18 +58,12 @@ def vehicle_mask(
         config: Brush length and margin.
         intrinsics: (fx, fy, cx, cy) [px].
         shape: (height, width) of the picture [px].
-
-    Returns:
-        uint8 picture of that shape, 255 where hidden.
     """
     mask = np.zeros(shape, np.uint8)
-    tip = np.asarray(vehicle.tip_position_m, float)
-    axis = np.array([1.0, 0.0, 0.0])
-    _fill_rod(mask, vehicle, intrinsics, np.array([0.0, tip[1], tip[2]]), tip, vehicle.arm_radius_m)
-    _fill_rod(mask, vehicle, intrinsics, tip - config.brush_length_m * axis, tip, 0.5 * brush_width_m)
-    return _grow(mask, config.margin_px * shape[1] / REFERENCE_WIDTH) | propeller_mask(
-        vehicle, config, intrinsics, shape
-    )
+    _fill_rod(mask, vehicle, intrinsics, vehicle.tip_position_m[0], vehicle.arm_radius_m)
+    _fill_rod(mask, vehicle, intrinsics, config.brush_length_m, 0.5 * brush_width_m)
+    grown = _grow(mask, config.margin_px * shape[1] / REFERENCE_WIDTH)
+    return grown | propeller_mask(vehicle, config, intrinsics, shape)
 
 
 def propeller_mask(
@@ -75,8 +72,7 @@ def propeller_mask(
     """The part of `vehicle_mask` that its propellers hide."""
     mask = np.zeros(shape, np.uint8)
     for hub, thrust_axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
-        disc = hub + _circle(thrust_axis, vehicle.propeller_radius_m)
-        _fill_hull(mask, _project(disc, vehicle, intrinsics))
+        _fill_hull(mask, _project(hub + _circle(thrust_axis, vehicle.propeller_radius_m), vehicle, intrinsics))
     return _grow(mask, config.margin_px * shape[1] / REFERENCE_WIDTH)
 
 
@@ -85,9 +81,7 @@ def brush_zone(
 ) -> np.ndarray:
     """Pixels of the brush grown by the margin within which fresh paint appears, uint8 (H, W)."""
     zone = np.zeros(shape, np.uint8)
-    tip = np.asarray(vehicle.tip_position_m, float)
-    rear = tip - config.brush_length_m * np.array([1.0, 0.0, 0.0])
-    _fill_rod(zone, vehicle, intrinsics, rear, tip, 0.5 * brush_width_m)
+    _fill_rod(zone, vehicle, intrinsics, config.brush_length_m, 0.5 * brush_width_m)
     return _grow(zone, config.paint_margin_px * shape[1] / REFERENCE_WIDTH)
 
 
@@ -108,17 +102,13 @@ def _project(points: np.ndarray, vehicle: VehicleParams, intrinsics: Intrinsics)
     return np.column_stack((fx * camera[:, 0] / camera[:, 2] + cx, fy * camera[:, 1] / camera[:, 2] + cy))
 
 
-def _fill_rod(
-    mask: np.ndarray, vehicle: VehicleParams, intrinsics: Intrinsics, start: np.ndarray, end: np.ndarray, radius: float
-) -> None:
-    """Fill the image of a round rod: hulls of neighbouring cross sections, so that perspective is kept."""
-    axis = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
-    circle = _circle(axis, radius)
-    sections = [
-        _project(start + share * (end - start) + circle, vehicle, intrinsics)
-        for share in np.linspace(0.0, 1.0, _STATIONS)
-    ]
-    for one, two in itertools.pairwise(sections):
+def _fill_rod(mask: np.ndarray, vehicle: VehicleParams, intrinsics: Intrinsics, length_m: float, radius: float) -> None:
+    """Fill the image of a round rod up to the tip: hulls of neighbouring cross sections keep the perspective."""
+    end = np.asarray(vehicle.tip_position_m, float)
+    start = end - length_m * np.array([1.0, 0.0, 0.0])
+    circle = _circle((end - start) / max(float(np.linalg.norm(end - start)), 1e-9), radius)
+    stations = [start + share * (end - start) + circle for share in np.linspace(0.0, 1.0, _STATIONS)]
+    for one, two in itertools.pairwise([_project(station, vehicle, intrinsics) for station in stations]):
         _fill_hull(mask, np.vstack((one, two)))
 
 
@@ -162,10 +152,11 @@ class CoarseGrid:
         corners: The same of the samples' upper left corners, for `mean_inverse_depth`.
     """
 
-    def __init__(self, shape: tuple[int, int], intrinsics: Intrinsics, mask: np.ndarray, columns: int) -> None:
-        """Lay the grid over a picture of (height, width) [px] with its vehicle mask."""
-        height, width = shape
-        self.stride = max(1, round(width / columns))
+    def __init__(self, intrinsics: Intrinsics, mask: np.ndarray, config: PlaneConfig, sparser: int = 1) -> None:
+        """Lay the grid over a picture with its vehicle mask (H, W), by a factor sparser than stated."""
+        height, width = mask.shape
+        self._range_m = float(config.distance_min_m), float(config.distance_max_m)
+        self.stride = max(1, round(width / (config.grid_columns // sparser)))
         self.offset, self.intrinsics = self.stride // 2, intrinsics
         fx, fy, cx, cy = intrinsics
         u, v = np.arange(self.offset, width, self.stride), np.arange(self.offset, height, self.stride)
@@ -189,23 +180,19 @@ class CoarseGrid:
             return cv2.remap(picture, self._places, _WHOLE, cv2.INTER_NEAREST)
         return picture[self.offset :: self.stride, self.offset :: self.stride]
 
-    def read(self, frame: RgbdFrame, config: PlaneConfig) -> Samples:
-        """A picture at the samples."""
-        return Samples(self, frame.rgb, self.sample(frame.rgb), self.inverse_depth(frame.depth, config))
-
-    def inverse_depth(self, depth: np.ndarray, config: PlaneConfig) -> np.ndarray:
+    def inverse_depth(self, depth: np.ndarray) -> np.ndarray:
         """1/Z at the samples [1/m], 0 where the depth is absent, not finite or out of range, (rows, columns)."""
         z = np.asarray(self.sample(depth), np.float32).astype(float)
-        usable = (z > config.distance_min_m) & (z < config.distance_max_m)
+        usable = (z > self._range_m[0]) & (z < self._range_m[1])
         return np.divide(1.0, z, out=np.zeros(z.shape), where=usable)
 
-    def mean_inverse_depth(self, depth: np.ndarray, config: PlaneConfig) -> np.ndarray:
+    def mean_inverse_depth(self, depth: np.ndarray) -> np.ndarray:
         """1/Z of the mean depth of the four pixels around the upper left corner of each sample, else as above.
 
         A pixel without a reading pulls the mean far off the surface.
         """
         depth = np.require(depth, np.float32, ("C", "W"))  # the one type of the kernel
-        return _mean_inverse(depth, self._places, float(config.distance_min_m), float(config.distance_max_m))
+        return _mean_inverse(depth, self._places, *self._range_m)
 
     def cells_at(self, u: ArrayLike, v: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows and columns of the samples nearest to pixels, the border's beyond the grid, and which pixels are not."""
@@ -228,18 +215,8 @@ class CoarseGrid:
         return (rows[:, :, None] * self.shape[1] + columns[:, None]).reshape(len(cells), -1)
 
 
-@dataclass(frozen=True)
-class Samples:
-    """One picture, read at the samples of a grid."""
-
-    grid: CoarseGrid  # where the samples lie
-    rgb: np.ndarray  # the picture, uint8 (H, W, 3)
-    colors: np.ndarray  # its colours, uint8 (rows, columns, 3)
-    inverse: np.ndarray  # 1/Z [1/m], 0 where absent or out of range, (rows, columns)
-
-
 @kernel("f8[:, ::1](f4[:, ::1], i2[:, :, ::1], f8, f8)")
-def _mean_inverse(depth: np.ndarray, places: np.ndarray, nearest: float, farthest: float) -> np.ndarray:
+def _mean_inverse(depth, places, nearest, farthest):
     """1/Z of the mean depth around the upper left corners of places (rows, columns, 2), 0 where out of range."""
     (rows, columns, _), quarter = places.shape, np.float32(0.25)
     inverse = np.empty((rows, columns))
@@ -279,9 +256,8 @@ class PictureLayout:
         # The arm stands still in the picture: no window of a followed point may show its edge.
         window = cv2.getStructuringElement(cv2.MORPH_RECT, (config.flow.window_px, config.flow.window_px))
         self.excluded = np.asarray(cv2.dilate(hidden, window), np.uint8)
-        columns = config.plane.grid_columns
-        self.grid = CoarseGrid(shape, intrinsics, self.mask, columns)
-        self.sparse_grid = CoarseGrid(shape, intrinsics, self.mask, columns // SPARSER)
+        self.grid = CoarseGrid(intrinsics, self.mask, config.plane)
+        self.sparse_grid = CoarseGrid(intrinsics, self.mask, config.plane, SPARSER)
         self.beside_brush = np.flatnonzero(self.grid.free & (self.grid.sample(zone) > 0))
         self.ladder: list[Seeds] = []
         if vehicle is not None:
@@ -297,7 +273,7 @@ class Seeds:
     """Cells beside the place where the tip meets a surface, which lies at one depth [m]."""
 
     depth: float
-    cells: list[tuple[int, int]]
+    cells: list[Cell]
 
 
 def seeds_ahead(
@@ -305,11 +281,8 @@ def seeds_ahead(
 ) -> list[Seeds]:
     """Seeds for a surface in contact, then for farther ones; the vehicle hides none of them.
 
-    Args:
-        grid: Where samples lie.
-        vehicle: Tip and camera.
-        brush_width_m: Diameter of the brush, the distance of seeds [m].
-        inwards: Where the surface lies from the tip at the beginning of a job, (right, down): +1 or -1 each.
+    They lie beside a brush of some diameter [m], inwards of the place from which a job begins, (right, down): +1 or -1
+    each.
     """
     x, y, z = to_camera(np.asarray(vehicle.tip_position_m, float), np.asarray(vehicle.camera_position_m, float))
     nearest = max(z, _NEAREST_M)
@@ -319,9 +292,7 @@ def seeds_ahead(
     return [Seeds(z, _beside(grid, (x / z, y / z), radius / z, inwards)) for z in rungs]
 
 
-def _beside(
-    grid: CoarseGrid, center: tuple[float, float], radius: float, inwards: tuple[int, int]
-) -> list[tuple[int, int]]:
+def _beside(grid: CoarseGrid, center: Place, radius: float, inwards: Cell) -> list[Cell]:
     """Cells beside a place and inwards of it, else anywhere near; those nearest to the tip first."""
     right, down = inwards
     aside = ((right, 0), (-right, 0), (right, down), (-right, down))
@@ -331,12 +302,8 @@ def _beside(
 
 
 def _free_cells(
-    grid: CoarseGrid,
-    center: tuple[float, float],
-    radius: float,
-    steps: tuple[float, ...],
-    directions: tuple[tuple[int, int], ...],
-) -> list[tuple[int, int]]:
+    grid: CoarseGrid, center: Place, radius: float, steps: tuple[float, ...], directions: tuple[Cell, ...]
+) -> list[Cell]:
     """Cells at steps of a radius from a normalised place that nothing hides, those of the first step first."""
     fx, fy, cx, cy = grid.intrinsics
     x, y = (c + np.multiply.outer(steps, way) * radius for c, way in zip(center, np.transpose(directions), strict=True))

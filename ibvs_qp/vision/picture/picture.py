@@ -1,16 +1,18 @@
-"""One frame for the stages: exposure levelled, with mask, grid, depth and camera."""
+"""One picture for all stages: exposure levelled, with mask, samples, camera and gravity."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import cached_property
 
 import cv2
 import numpy as np
 
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.compilation import middle
 from ibvs_qp.vision.config import REFERENCE_WIDTH
-from ibvs_qp.vision.medians import middle
-from ibvs_qp.vision.picture.layout import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics, PictureLayout
 
 #: Pictures of less than this scale are searched at full resolution.
 _SMALL = 0.9
@@ -26,55 +28,37 @@ _FADE_S = 5.0
 _LONGEST_GAP = 0.2
 
 
-@dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A colour picture with the vehicle's mask, depth and surface."""
+    """A frame at its places: everything that the stages read of it.
 
-    rgb: np.ndarray  # the picture itself, uint8 (H, W, 3)
-    mask: np.ndarray  # non-zero where the vehicle hides the view, uint8 (H, W)
-    intrinsics: Intrinsics  # (fx, fy, cx, cy) [px]
-    scale: float  # factor for settings in pixels of a 640 wide picture
-    depth: np.ndarray | None = None  # depth [m], float32 (H, W), or None
-    plane: tuple[float, float, float] | None = None  # (a, b, c) of the working surface, or None
+    Attributes:
+        rgb, depth: The frame itself, uint8 (H, W, 3) and float32 (H, W) [m].
+        mask: Non-zero where the vehicle hides the view, uint8 (H, W).
+        intrinsics: (fx, fy, cx, cy) [px].
+        scale: Factor for settings in pixels of a 640 wide picture.
+        layout, grid: Masks and grids, and the coarse grid of them.
+        down: Gravity's direction in C, unit, (3,), or None if unknown.
+        tilt: Angle of gravity in the picture from down [rad], or None if unknown.
+        plane: (a, b, c) of the surface, or None before it is known.
+    """
 
-    @classmethod
-    def of(
-        cls,
-        rgb: np.ndarray,
-        mask: np.ndarray,
-        intrinsics: Intrinsics,
-        depth: np.ndarray | None = None,
-        plane: np.ndarray | None = None,
-    ) -> Picture:
-        """Wrap a picture, its scale taken from its longer side."""
-        return cls(
-            rgb=np.ascontiguousarray(rgb),
-            mask=np.ascontiguousarray(mask),
-            intrinsics=(float(intrinsics[0]), float(intrinsics[1]), float(intrinsics[2]), float(intrinsics[3])),
-            scale=max(mask.shape) / REFERENCE_WIDTH,
-            depth=None if depth is None else np.ascontiguousarray(depth, np.float32),
-            plane=None if plane is None else (float(plane[0]), float(plane[1]), float(plane[2])),
-        )
+    def __init__(self, frame: RgbdFrame, layout: PictureLayout, down: np.ndarray | None = None) -> None:
+        fx, fy, cx, cy = frame.intrinsics
+        self.rgb, self.depth, self.intrinsics = frame.rgb, frame.depth, (float(fx), float(fy), float(cx), float(cy))
+        self.layout, self.grid, self.mask, self.down = layout, layout.grid, layout.mask, down
+        self.tilt = None if down is None else float(np.arctan2(-down[0], down[1]))
+        self.scale = max(self.mask.shape) / REFERENCE_WIDTH
+        self.plane: tuple[float, float, float] | None = None
 
+    @cached_property
+    def colors(self) -> np.ndarray:
+        """Colours at the samples of the grid, uint8 (rows, columns, 3)."""
+        return self.grid.sample(self.rgb)
 
-def normalised_line(p: float, q: float, r: float, intrinsics: Intrinsics) -> tuple[float, float]:
-    """(rho, theta) of the pixel line p u + q v + r = 0."""
-    fx, fy, cx, cy = intrinsics
-    a, b, c = p * fx, q * fy, p * cx + q * cy + r
-    length = math.hypot(a, b)
-    return -c / length, math.atan2(b, a)
-
-
-def normalise(pixels: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
-    """Normalised coordinates of pixels (..., 2)."""
-    fx, fy, cx, cy = intrinsics
-    return (pixels - np.array([cx, cy])) / np.array([fx, fy])
-
-
-def denormalise(points: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
-    """Pixels of normalised coordinates (..., 2)."""
-    fx, fy, cx, cy = intrinsics
-    return points * np.array([fx, fy]) + np.array([cx, cy])
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """1/Z at the samples [1/m], 0 where absent or out of range, (rows, columns)."""
+        return self.grid.inverse_depth(self.depth)
 
 
 class ExposureSteps:
@@ -124,3 +108,19 @@ def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
         return rgb, 1
     even = rgb[: height // 2 * 2, : width // 2 * 2]  # the factor must be exact
     return cv2.resize(even, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
+
+
+def camera_matrix(intrinsics: Sequence[float]) -> np.ndarray:
+    """OpenCV's camera matrix of (fx, fy, cx, cy) [px], (3, 3)."""
+    fx, fy, cx, cy = intrinsics
+    return np.array(((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)))
+
+
+def normalise(pixels: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
+    """Normalised coordinates of pixels (..., 2)."""
+    return (pixels - np.array(intrinsics[2:])) / np.array(intrinsics[:2])
+
+
+def denormalise(points: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
+    """Pixels of normalised coordinates (..., 2)."""
+    return points * np.array(intrinsics[:2]) + np.array(intrinsics[2:])

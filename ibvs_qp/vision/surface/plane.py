@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT
-from ibvs_qp.vision.compilation import kernel
+from ibvs_qp.vision.compilation import MAD_TO_SIGMA, kernel, median
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
-from ibvs_qp.vision.picture.layout import SPARSER, CoarseGrid, Samples
+from ibvs_qp.vision.picture.layout import SPARSER, CoarseGrid
+from ibvs_qp.vision.picture.picture import Picture
 
 #: Gate of samples that look like paint in either round, fraction of the board's: a wall that looks like paint must not
 #: get in, so such samples count in the last round of a search only, and have to fit twice as well. For a followed
@@ -34,25 +35,15 @@ _GATE_LOW, _GATE_HIGH, _GATE_SIGMAS = 0.010, 0.022, 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneEstimate:
-    """A fitted surface in the camera frame.
+    """A fitted surface in the camera frame."""
 
-    Attributes:
-        inverse_depth: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
-        covariance: Of (a, b, c), correlated noise and the frame's common mode included, (3, 3).
-        normal: Outward unit normal (towards the camera) in C, (3,).
-        distance_m: Distance of the camera centre from the plane [m].
-        inlier_share: Fraction of the valid samples of the whole picture that belong to the surface.
-        residual_sigma: Standard deviation of the residuals, fraction of depth.
-        component: Samples of the surface, bool (rows, columns) of the coarse grid.
-    """
-
-    inverse_depth: np.ndarray
-    covariance: np.ndarray
-    normal: np.ndarray
-    distance_m: float
-    inlier_share: float
-    residual_sigma: float
-    component: np.ndarray
+    inverse_depth: np.ndarray  # (a, b, c) of 1/Z = a x + b y + c [1/m], (3,)
+    covariance: np.ndarray  # of (a, b, c), correlated noise and the frame's common mode included, (3, 3)
+    normal: np.ndarray  # outward unit normal (towards the camera) in C, (3,)
+    distance_m: float  # distance of the camera centre from the plane [m]
+    inlier_share: float  # fraction of the valid samples of the whole picture that belong to the surface
+    residual_sigma: float  # standard deviation of the residuals, fraction of depth
+    component: np.ndarray  # samples of the surface, bool (rows, columns) of the coarse grid
 
     @property
     def abcd(self) -> tuple[float, float, float, float]:
@@ -178,17 +169,7 @@ def depth_noise(inverse: np.ndarray) -> float:
 
 
 @kernel("Tuple((f8[::1], b1[::1]))(f8[:, ::1], f8[::1], b1[::1], u1[::1], f8[::1], b1, f8, f8, i8)")
-def choose_samples(
-    design: np.ndarray,
-    inverse: np.ndarray,
-    usable: np.ndarray,
-    labels: np.ndarray,
-    plane: np.ndarray,
-    own_depth: bool,
-    gate: float,
-    paint_gate: float,
-    least: int,
-) -> tuple[np.ndarray, np.ndarray]:
+def choose_samples(design, inverse, usable, labels, plane, own_depth, gate, paint_gate, least):
     """Usable samples (n,) within a gate of a plane, those of the surface's colours alone where at least so many are.
 
     Samples that look like paint count within a fraction of the gate. Distances are fractions of the samples' own depth
@@ -212,11 +193,10 @@ def choose_samples(
 
 
 @kernel("Tuple((b1, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], b1[::1])")
-def fit_plane(design: np.ndarray, inverse: np.ndarray, chosen: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+def fit_plane(design, inverse, chosen):
     """Least squares over chosen samples, by cofactors.
 
-    Returns:
-        Whether the samples determine a plane, (a, b, c), (3,), and the inverse of the normal matrix, (3, 3).
+    Returns whether the samples determine a plane, (a, b, c), (3,), and the inverse of the normal matrix, (3, 3).
     """
     xx = xy = x = yy = y = one = xd = yd = d = 0.0
     for i in range(len(inverse)):
@@ -242,9 +222,7 @@ def fit_plane(design: np.ndarray, inverse: np.ndarray, chosen: np.ndarray) -> tu
 
 
 @kernel("UniTuple(f8, 2)(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], i8)")
-def residual_squares(
-    design: np.ndarray, inverse: np.ndarray, component: np.ndarray, plane: np.ndarray, block: int
-) -> tuple[float, float]:
+def residual_squares(design, inverse, component, plane, block):
     """Sum of the squares of residuals [1/m^2] over the component, and of their sums over blocks of so many samples.
 
     Residuals that hold together add up in the latter.
@@ -273,7 +251,6 @@ def residual_squares(
 class SurfaceRegion:
     """The surface in one picture."""
 
-    grid: CoarseGrid  # coarse grid of the picture
     plane: PlaneEstimate  # its plane
     cells: np.ndarray  # samples on it by depth, bool (rows, columns)
     colored: np.ndarray  # those of them that have its colour, bool (rows, columns)
@@ -285,10 +262,14 @@ class SurfaceRegion:
         """Samples within so many cells of the surface's end, by depth or by colour, bool (rows, columns)."""
         kernel = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
         band = np.zeros(self.cells.shape, bool)
-        for region in (self.cells, self.colored):
-            whole = filled(region)
+        for whole in (filled(self.cells), self.whole):
             band |= (cv2.dilate(whole, kernel) > 0) & (cv2.erode(whole, kernel, borderValue=1) == 0)
         return band
+
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """The surface by colour without holes, uint8 (rows, columns)."""
+        return filled(self.colored)
 
 
 def depth_gate(plane: PlaneEstimate) -> float:
@@ -296,9 +277,9 @@ def depth_gate(plane: PlaneEstimate) -> float:
     return min(max(_GATE_SIGMAS * plane.residual_sigma, _GATE_LOW), _GATE_HIGH)
 
 
-def samples_on(samples: Samples, plane: PlaneEstimate, seed: tuple[int, int]) -> np.ndarray:
+def samples_on(picture: Picture, plane: PlaneEstimate, seed: tuple[int, int]) -> np.ndarray:
     """Connected samples on a plane by depth alone, bool (rows, columns)."""
-    grid, inverse = samples.grid, samples.inverse
+    grid, inverse = picture.grid, picture.inverse
     predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
     relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
     cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
@@ -328,11 +309,11 @@ def connected(region: np.ndarray, grid: CoarseGrid, seed: tuple[int, int]) -> np
     return connected_samples(closed, grid, seed) & region
 
 
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
-    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, of any colour.
+def on_surface(picture: Picture, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
+    """Those of flat places of samples, (n,), that lie on a surface by depth alone, of any colour.
 
     The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
     """
-    u, v = (axis.take(places) for axis in grid.pixels)
-    z, design = depth[v, u], grid.design.take(places, axis=0)
+    u, v = (axis.take(places) for axis in picture.grid.pixels)
+    z, design = picture.depth[v, u], picture.grid.design.take(places, axis=0)
     return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
