@@ -25,9 +25,7 @@ ORDER = {
 }
 #: Parts of a folder in the order of their imports. Those of vision are its stages: data passes forward.
 PARTS = {
-    "vision": (
-        "compilation medians config checks picture appearance surface flow lines perception_result paper perception"
-    ).split(),
+    "vision": ("compilation config checks picture appearance surface flow lines perception paper").split(),
     "pilot": "painting config pilot presets".split(),
     "interfaces": "overlay c_library log ros px4".split(),
 }

@@ -37,7 +37,7 @@ from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception import PerceptionResult
 
 
 class Controller(Protocol):

@@ -9,7 +9,7 @@ import pytest
 from rendered_scenes import Flight, World, board_edge, row_edge, scene_of, stroke_row
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.appearance.labels import LIGHT_STEP
+from ibvs_qp.vision.appearance.colors import LIGHT_STEP
 from ibvs_qp.vision.appearance.light import LightField, fit_light, products
 
 FRAMES, SETTLE = 14, 8
