@@ -260,8 +260,10 @@ class Model:
 
     @property
     def force_along_normal(self) -> ca.SX:
-        """Net force without contact along n, as a function of the thrusts [N]."""
-        return ca.dot(self.normal, self.wrench[:3])
+        """Mass times the tip's acceleration along n without contact, as a function of the thrusts [N]."""
+        vehicle = self.config.vehicle
+        turning = ca.cross(self.acceleration[3:], ca.DM(vehicle.tip_position_m))
+        return ca.dot(self.normal, self.wrench[:3] + vehicle.mass_kg * turning)
 
     @property
     def body_rotation_gain(self) -> ca.SX:

@@ -118,7 +118,7 @@ def _truth(flown: Flown, truth: np.ndarray) -> dict[str, np.ndarray]:
         "position": position.copy(),
         "attitude": attitude.copy(),
         "velocity": in_body(rotation, truth[:, PLACES["velocity"]]),
-        "euler": euler_angles(rotation),
+        "euler": euler_angles(BoardGeometry(flown.scene).from_ned.T @ rotation),
         "tip": position + rotation @ np.array(flown.vehicle.tip_position_m),
         "friction_true": truth[:, PLACES["friction"]].copy(),
         "propeller_clearance": np.repeat(clearance, every)[: len(truth)],

@@ -23,11 +23,11 @@ PAINTED = 0.5
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",
-    "position": "(N,3) true centre of mass, world NED, x into the wall [m]",
+    "position": "(N,3) true centre of mass, world (NED before an upright wall), x into the wall [m]",
     "velocity": "(N,3) true velocity of the centre of mass in B [m/s]",
-    "attitude": "(N,4) true quaternion (w,x,y,z) of B in I",
-    "euler": "(N,3) true roll, pitch, yaw [rad]; yaw 0 faces the wall",
-    "tip": "(N,3) true tip position, world NED; x = 0 is the board's face [m]",
+    "attitude": "(N,4) true quaternion (w,x,y,z) of B in the world",
+    "euler": "(N,3) true roll, pitch, yaw against gravity [rad]; yaw 0 faces the wall",
+    "tip": "(N,3) true tip position, world; x = 0 is the board's face [m]",
     "thrusts": "(N,n) commanded thrusts [N]",
     "thrusts_actual": "(N,n) thrusts after motor lag [N]",
     "thrust_min": "(n,) lower limits [N]",

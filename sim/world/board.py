@@ -1,8 +1,9 @@
 """Position of board and nominal strokes in the world (truth; no input of the controller).
 
-World NED with the wall to the north: x points into the wall, y to the right for the vehicle, z down. The
-board's face is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at
-x = gap_m. Points on the board are given as (along, up) metres from that corner, turned with the board's slope.
+World: x points into the wall along its normal, y to the right for the vehicle, z down along the wall. The board's face
+is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at x = gap_m. For an
+upright wall this is NED with the wall to the north; a leaning one turns gravity, and with it NED, about y. Points on
+the board are given as (along, up) metres from that corner, turned with the board's slope.
 """
 
 from __future__ import annotations
@@ -22,6 +23,29 @@ class BoardGeometry:
     """Geometry of board and paint job derived from a scene."""
 
     scene: Scene
+
+    @cached_property
+    def down(self) -> np.ndarray:
+        """Unit vector of gravity in the world, (3,)."""
+        lean = math.radians(self.scene.board.lean_deg)
+        return np.array([math.sin(lean), 0.0, math.cos(lean)])
+
+    @cached_property
+    def attitude(self) -> np.ndarray:
+        """Quaternion (w, x, y, z) of the world in NED, (4,)."""
+        half = 0.5 * math.radians(self.scene.board.lean_deg)
+        return np.array([math.cos(half), 0.0, -math.sin(half), 0.0])
+
+    @cached_property
+    def from_ned(self) -> np.ndarray:
+        """Rotation from NED to the world, (3, 3)."""
+        sine, _, cosine = self.down.tolist()
+        return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+
+    @property
+    def ground(self) -> float:
+        """Height of the ground: the points with ``down @ point`` of this [m]; the corner stays at its height."""
+        return self.scene.board.bottom_m * (1.0 - self.down[2])
 
     @cached_property
     def along(self) -> np.ndarray:

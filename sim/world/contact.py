@@ -25,7 +25,7 @@ STICK_RATE = 100.0
 #: implicit in the velocity and there is one contact, so Euler steps without a search for islands cost a seventh less;
 #: constraint types that the model lacks are disabled.
 OPTION_XML = (
-    '<option timestep="0.001" gravity="0 0 -{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
+    '<option timestep="0.001" gravity="{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
     'solver="Newton" jacobian="dense" noslip_iterations="3"><flag autoreset="disable" island="disable" '
     'equality="disable" frictionloss="disable" limit="disable" spring="disable" damper="disable" clampctrl="disable" '
     'eulerdamp="disable"/></option>'

@@ -2,8 +2,8 @@
 
 Body frame: origin at the ASSUMED centre of mass, axes front-left-up. The vehicle is one body without its tool, and
 the tool beyond the force/torque sensor is a rigid child, so that the sensor reads exactly the tool's load; together
-they have the scene's mass, centre of mass and inertia. World: x into the wall, y left, z up; the board's face is
-the plane x = 0, its bottom left corner lies at y = 0 (see `sim.world.board`).
+they have the scene's mass, centre of mass and inertia. World: x into the wall, y left, z up along it; the board's face
+is the plane x = 0, its bottom left corner lies at y = 0 (see `sim.world.board`).
 """
 
 # MuJoCo's bindings carry no types.
@@ -18,6 +18,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
+from sim.world.board import BoardGeometry
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
 from sim.world.drawn_shape import tool_xml, vehicle_xml
 from sim.world.face import TIP_RADIUS_M
@@ -115,7 +116,7 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
         surroundings, body, tool = _surroundings_xml(scene), vehicle_xml(vehicle), tool_xml(vehicle, scene)
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
-  {OPTION_XML.format(gravity=numbers(GRAVITY))}
+  {OPTION_XML.format(gravity=numbers(GRAVITY * FLIP * BoardGeometry(scene).down))}
   <statistic extent="1"/>
   <worldbody>
     <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>

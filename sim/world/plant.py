@@ -30,7 +30,8 @@ from sim.world.wind import Wind
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
-_SAFE, _SINK, _TIP = PLACES["safe"].start, PLACES["velocity"].stop - 1, PLACES["tip"]
+_SAFE, _TIP = PLACES["safe"].start, PLACES["tip"]
+_FALL = slice(PLACES["depth"].start, PLACES["upright"].stop)
 
 
 class Plant(PlantReadings):
@@ -73,11 +74,11 @@ class Plant(PlantReadings):
         self.model, self._ids = build_model(scene, self.vehicle, self._steps, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
-        board = BoardGeometry(scene)
+        self._board = board = BoardGeometry(scene)
         self.clearance = PropellerClearance(board, self.vehicle)
         self._face = Face(board, self.model.geom_pos[self._ids.face])
         drag = self.vehicle.linear_drag_n_s_m
-        self.wind = Wind(scene.wind, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
+        self.wind = Wind(scene.wind, board.from_ned, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
         self._factors = ThrustFactors(rotors, count, self.tick_ns * 1e-9, seed) if rotors != RotorErrors() else None
         self.time_ns = 0
@@ -92,7 +93,8 @@ class Plant(PlantReadings):
         model, data, ids, truth = self.model, self.data, self._ids, self.vehicle
         self._act = data.act
         centre = np.array(truth.com_offset_m)
-        points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach]))
+        board = self._board
+        points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach], board.down[::2], [board.ground]))
         self.truth, self.pushes = np.zeros(SIZE), np.zeros(self._steps)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
@@ -112,9 +114,9 @@ class Plant(PlantReadings):
             (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
         )
 
-    def _start(self, position: np.ndarray, yaw: float, thrusts: np.ndarray) -> None:
+    def _start(self, position: np.ndarray, attitude: np.ndarray, thrusts: np.ndarray) -> None:
         self.data.qpos[:3] = FLIP * position
-        self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+        self.data.qpos[3:7] = FLIP_QUATERNION * attitude
         self.data.act[:] = self.data.ctrl[:] = thrusts
         mujoco.mj_forward(self.model, self.data)
         ids, sensed, history = self._ids, self.data.sensordata, self.data.history
@@ -144,9 +146,11 @@ class Plant(PlantReadings):
         self.time_ns += self.tick_ns
         self._read()
         if self.truth.item(_SAFE) != 1.0 and not self.over:
+            depth, sink, upright = self.truth[_FALL].tolist()
             position, rotation = self.position.tolist(), self.rotation.tolist()
-            self.landed = has_landed(position, rotation, self.truth.item(_SINK))
-            self.crashed = None if self.landed else crash_reason(position, rotation, self.clearance)
+            self.landed = has_landed(depth, upright, sink)
+            crash = None if self.landed else crash_reason(position, rotation, depth, upright, self.clearance)
+            self.crashed = crash
         if struck and not self.over:
             self.crashed = struck
 

@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
+from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
+from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle
 
 _PUSH, _TIP = PLACES["push"].start, PLACES["tip"]
@@ -22,6 +24,7 @@ def _reading(name: str, text: str) -> property:
 class PlantReadings:
     """Pose, motion, forces and contact of a plant, each a copy."""
 
+    scene: Scene
     truth: np.ndarray
     pushes: np.ndarray
     vehicle: TrueVehicle
@@ -55,7 +58,8 @@ class PlantReadings:
     @property
     def euler(self) -> np.ndarray:
         """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall, + to the right."""
-        (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = self.rotation.tolist()
+        ned = BoardGeometry(self.scene).from_ned.T @ self.rotation
+        (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = ned.tolist()
         pitch = math.asin(max(-1.0, min(1.0, -forward_z)))
         return np.array([math.atan2(right_z, down_z), pitch, math.atan2(forward_y, forward_x)])
 

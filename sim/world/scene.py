@@ -28,6 +28,9 @@ class BoardScene(Checked):
     slope_deg: float = setting(
         0.0, "turn in its own plane, + clockwise in the picture", unit="deg", low=-10.0, high=10.0
     )
+    lean_deg: float = setting(
+        0.0, "lean of board and wall, + with the top away from the vehicle", unit="deg", low=-15.0, high=15.0
+    )
     gap_m: float = setting(0.05, "distance of the board's face in front of the wall", unit="m", low=0.005, high=1.0)
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
     clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)

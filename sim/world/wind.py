@@ -18,17 +18,25 @@ class Wind:
     r"""Drag in a mean wind plus a first-order Gauss-Markov gust force per world axis.
 
     The gust is :math:`g_{k+1} = a g_k + \sigma \sqrt{1 - a^2}\, n_k`, a = exp(-dt / tau); it starts in its
-    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time, or by `change`.
+    stationary distribution. Attribute ``mean`` (world [m/s]) may be changed at any time, or by `change`.
 
     Args:
         scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
+        from_ned: Rotation from NED to the world, (3, 3).
         linear_drag: Force per airspeed [N s/m].
         tick_s: Time between calls of `force` [s].
         generator: Source of the gusts.
     """
 
-    def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
-        self.mean = np.array(scene.mean_m_s)
+    def __init__(
+        self,
+        scene: WindScene,
+        from_ned: np.ndarray,
+        linear_drag: float,
+        tick_s: float,
+        generator: np.random.Generator,
+    ) -> None:
+        self._from_ned, self.mean = from_ned, from_ned @ scene.mean_m_s
         self._drag, self._tick_s = linear_drag, tick_s
         self._steps: list[np.ndarray] = []  # means of the ticks to come, the last first
         self._rms = scene.gust_n_rms
@@ -40,13 +48,13 @@ class Wind:
     def change(self, mean_m_s: Sequence[float], rise_s: float) -> None:
         """Change the mean [m/s] (NED) evenly within a time [s]: a front that passes the vehicle."""
         ticks = max(round(rise_s / self._tick_s), 1)
-        self._steps = list(np.linspace(np.array(mean_m_s), self.mean, ticks, endpoint=False))
+        self._steps = list(np.linspace(self._from_ned @ mean_m_s, self.mean, ticks, endpoint=False))
 
     def force(self, velocity: Sequence[float]) -> tuple[float, float, float]:
-        """Advance the gusts by one tick and return the force of the air, world NED [N].
+        """Advance the gusts by one tick and return the force of the air, world [N].
 
         Args:
-            velocity: Velocity of the centre of mass, world NED [m/s], (3,).
+            velocity: Velocity of the centre of mass, world [m/s], (3,).
         """
         if self._steps:
             self.mean = self._steps.pop()
