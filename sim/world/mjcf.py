@@ -40,6 +40,7 @@ class ModelIds:
 
     vehicle: int  # body of the vehicle without tool
     face: int  # geom of the contact plane
+    tip: int  # geom of the tip's sphere
     accelerometer: slice  # slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2]
     force: slice  # slice: force of the vehicle on the tool, front-left-up [N]
     torque: slice  # slice: the moment at the force/torque sensor [N m]
@@ -176,5 +177,5 @@ def build_model(
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
         # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
         remembered.append(int(model.sensor_historyadr[sensor]) + 2 + steps)
-    face = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "face")
-    return model, ModelIds(vehicle=body, face=face, **slices, remembered=tuple(remembered))
+    face, tip = (mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in ("face", "tip"))
+    return model, ModelIds(vehicle=body, face=face, tip=tip, **slices, remembered=tuple(remembered))

@@ -30,7 +30,7 @@ from sim.world.wind import Wind
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
-_SAFE, _TIP = PLACES["safe"].start, PLACES["tip"]
+_SAFE, _TIP, _FRICTION = PLACES["safe"].start, PLACES["tip"], PLACES["friction"]
 _FALL = slice(PLACES["depth"].start, PLACES["upright"].stop)
 
 
@@ -76,7 +76,8 @@ class Plant(PlantReadings):
         self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
         self._board = board = BoardGeometry(scene)
         self.clearance = PropellerClearance(board, self.vehicle)
-        self._face = Face(board, self.model.geom_pos[self._ids.face])
+        face = self._ids.face
+        self._face = Face(board, self.model.geom_pos[face], self.model.geom_quat[face])
         drag = self.vehicle.linear_drag_n_s_m
         self.wind = Wind(scene.wind, board.from_ned, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
@@ -94,7 +95,8 @@ class Plant(PlantReadings):
         self._act = data.act
         centre = np.array(truth.com_offset_m)
         board = self._board
-        points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach], board.down[::2], [board.ground]))
+        reach = self.clearance.reach if board.surface.flat else math.inf  # then every tick looks for a strike
+        points = np.concatenate((centre, truth.tip_position_m, [reach], board.down[::2], [board.ground]))
         self.truth, self.pushes = np.zeros(SIZE), np.zeros(self._steps)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
@@ -123,7 +125,17 @@ class Plant(PlantReadings):
         for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
             now = sensed[place]
             history[start : start + self._steps * len(now)] = np.tile(now, self._steps)
+        self._sense()
+
+    def _sense(self) -> None:
+        """Read the state; tip and friction in the chart."""
         self._read()
+        surface = self._board.surface
+        if surface.flat:
+            return
+        chart = surface.chart(self.truth[_TIP])
+        self.truth[_FRICTION] = self.truth[_FRICTION] @ surface.axes(chart)
+        self.truth[_TIP] = chart
 
     def step(self, thrusts: np.ndarray) -> None:
         """Advance one control tick under constant commanded thrusts.
@@ -142,9 +154,14 @@ class Plant(PlantReadings):
         self._drive()
         self._lag[:] = self._lags
         struck = self._face.follow(self.truth[_TIP].tolist())
-        mujoco.mj_step(self.model, self.data, self._steps)
+        if self._board.surface.flat:
+            mujoco.mj_step(self.model, self.data, self._steps)
+        else:
+            for _ in range(self._steps):
+                self._face.touch(self.data.geom_xpos[self._ids.tip])
+                mujoco.mj_step(self.model, self.data)
         self.time_ns += self.tick_ns
-        self._read()
+        self._sense()
         if self.truth.item(_SAFE) != 1.0 and not self.over:
             depth, sink, upright = self.truth[_FALL].tolist()
             position, rotation = self.position.tolist(), self.rotation.tolist()
@@ -167,7 +184,7 @@ class Plant(PlantReadings):
     def displace(self, offset: np.ndarray) -> None:
         """Move the vehicle at once by an offset in the world, NED [m], (3,): as if everything else had moved back."""
         self.data.qpos[:3] += FLIP * offset
-        self._read()
+        self._sense()
 
     @property
     def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:

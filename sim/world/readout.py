@@ -22,11 +22,11 @@ READINGS = {
     "rotation": 9,  # B to I, row by row
     "body_velocity": 3,  # in B [m/s]
     "centre_velocity": 3,  # of the true centre of mass, world [m/s]
-    "tip": 3,  # world [m]
+    "tip": 3,  # world [m]; `Plant` replaces it by its chart, and friction by its parts there
     "felt": 3,  # specific force in B, mean of the tick [m/s^2]
     "ft_wrench": 6,  # vehicle on tool, FRD, at the last physics step [N, N m]
     "push": 1,  # normal contact force at the last physics step [N]
-    "friction": 2,  # on the tip, world (y, z), at the last physics step [N]
+    "friction": 3,  # on the tip along the wall, world, at the last physics step [N]
     "depth": 1,  # of the body origin below the ground, < 0 above it [m]
     "sink": 1,  # velocity of the body origin downwards [m/s]
     "upright": 1,  # cosine of the tilt
@@ -90,9 +90,10 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     touches = [sensed(contact, 10, step) for step in range(steps)]
     pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
     found, _, first, second, *axes = touches[-1]
-    (_, ty, tz), (_, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])
-    # Minus the force on the board, in NED: the two signs of y and z cancel.
-    friction = [ca.if_else(found < 1.0, 0.0, value) for value in (first * ty + second * sy, first * tz + second * sz)]
+    (tx, ty, tz), (sx, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])
+    # Minus the force on the board, in FRD: the two signs of y and z cancel.
+    along = -first * tx - second * sx, first * ty + second * sy, first * tz + second * sz
+    friction = [ca.if_else(found < 1.0, 0.0, value) for value in along]
     total = sum(position[1:], position[0]) + sum(sum(row[1:], row[0]) for row in rotation)
     depth, upright = downwards(position) - ground, downwards([row[2] for row in rotation])
     level = ca.logic_and(upright >= FLIP_COSINE, depth <= -GROUND_CLEARANCE_M)

@@ -10,8 +10,11 @@ from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
+from sim.world.surfaces import KINDS
 
 Color = tuple[int, int, int]
+#: Steepest wall: angle of its normal to the horizon [deg].
+STEEPEST_DEG = 15.0
 #: Nominal rates and delays of the sensors.
 _SENSORS = channels(SensorFrame)
 _IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
@@ -28,13 +31,27 @@ class BoardScene(Checked):
     slope_deg: float = setting(
         0.0, "turn in its own plane, + clockwise in the picture", unit="deg", low=-10.0, high=10.0
     )
-    lean_deg: float = setting(
-        0.0, "lean of board and wall, + with the top away from the vehicle", unit="deg", low=-15.0, high=15.0
-    )
     gap_m: float = setting(0.05, "distance of the board's face in front of the wall", unit="m", low=0.005, high=1.0)
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
     clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)
     texture_seed: int = setting(0, "seed of textures and clutter, mixed with the flight's seed", low=0, high=2**31 - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceScene(Checked):
+    """The shape of wall and board; a plane has no radius."""
+
+    kind: str = choice("plane", "shape", tuple(KINDS))
+    lean_deg: float = setting(
+        0.0,
+        "lean in the middle of the board, + with the top away from the vehicle",
+        unit="deg",
+        low=-STEEPEST_DEG,
+        high=STEEPEST_DEG,
+    )
+    radius_m: float = setting(3.0, "radius", unit="m", low=1.5, high=1000.0)
+    axis: str = choice("upright", "direction of the axis of a cylinder", ("upright", "level"))
+    hollow: bool = setting(False, "the wall bends towards the vehicle, as inside a tank")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +166,7 @@ class Scene(Checked):
     """One complete scene; every section and key has a default."""
 
     board: BoardScene = field(default_factory=BoardScene)
+    surface: SurfaceScene = field(default_factory=SurfaceScene)
     wall: WallScene = field(default_factory=WallScene)
     paint: PaintScene = field(default_factory=PaintScene)
     start: StartScene = field(default_factory=StartScene)

@@ -35,8 +35,9 @@ def start_pose(scene: Scene, vehicle: VehicleParams, seed: int) -> tuple[np.ndar
     distance, right, down, turn = stream(seed, "start").uniform(-1.0, 1.0, 4)
     offset = np.array([-distance * START_DISTANCE_M, right * START_RIGHT_M, down * START_DOWN_M])
     board = BoardGeometry(scene)
-    yaw = math.radians(scene.start.yaw_deg + turn * START_YAW_DEG)
+    yaw = math.radians(scene.start.yaw_deg + turn * START_YAW_DEG) + board.bearing(board.start_tip)
     x, y, z = vehicle.tip_position_m
     arm = board.from_ned @ (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z)
     level = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
-    return board.start_tip + offset - arm, np.array(multiply(conjugate(board.attitude), level))
+    tip = board.surface.points(board.start_tip + offset)
+    return tip - arm, np.array(multiply(conjugate(board.attitude), level))

@@ -1,0 +1,80 @@
+"""The shape of a wall: its chart, which maps places on it to the world and back.
+
+A chart has the coordinates (depth, y, z): y and z are lengths along the surface, right and down from the board's bottom
+left corner at y = 0, z = -bottom_m; depth is the distance behind the face. The world's x axis is the normal into the
+wall in the middle of the board. On a plane chart and world are the same.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ibvs_qp.frames import rotation_from_quaternion
+from ibvs_qp.quaternion import conjugate, multiply
+
+if TYPE_CHECKING:
+    from sim.world.scene import SurfaceScene
+
+#: Kinds of surfaces by name.
+KINDS: dict[str, type[Surface]] = {}
+
+
+class Surface(ABC):
+    """A smooth surface; a subclass registers itself by ``class Own(Surface, kind="own")`` in a module of this folder.
+
+    Args:
+        middle: Middle of the board in the chart (y, z) [m], (2,).
+        settings: The scene's section ``surface``.
+    """
+
+    #: Whether chart and world are the same.
+    flat: ClassVar[bool] = False
+
+    def __init__(self, middle: np.ndarray, settings: SurfaceScene) -> None:  # noqa: B027
+        """Nothing by default."""
+
+    def __init_subclass__(cls, kind: str) -> None:
+        super().__init_subclass__()
+        KINDS[kind] = cls
+
+    @abstractmethod
+    def chart(self, points: np.ndarray) -> np.ndarray:
+        """Chart coordinates of points in the world [m], (..., 3)."""
+
+    @abstractmethod
+    def points(self, chart: np.ndarray) -> np.ndarray:
+        """Points in the world of chart coordinates [m], (..., 3)."""
+
+    @abstractmethod
+    def attitude(self, place: np.ndarray) -> np.ndarray:
+        """Quaternion (w, x, y, z) in the world of the tangent axes (into the wall, right, down) at a place (3,)."""
+
+    @abstractmethod
+    def curvature(self, place: np.ndarray) -> np.ndarray:
+        """Normal curvatures along right and down at a place (3,) [1/m], (2,): > 0 bulges towards the vehicle."""
+
+    def axes(self, place: np.ndarray) -> np.ndarray:
+        """Columns (into the wall, right, down) at a place of the chart (3,), in the world, (3, 3)."""
+        return rotation_from_quaternion(self.attitude(place))
+
+    def flattened(
+        self, position: np.ndarray, quaternion: np.ndarray, place: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """A pose as seen from the tangent plane at a place: as before a flat wall with the same chart.
+
+        Args:
+            position: In the world [m], (3,).
+            quaternion: Attitude in the world, (4,).
+            place: Touching point of the tangent plane, in the chart (0, y, z) [m], (3,).
+
+        Returns:
+            Position [m], (3,), and quaternion, (4,).
+        """
+        if self.flat:
+            return position, quaternion
+        tangent = self.attitude(place)
+        moved = rotation_from_quaternion(tangent).T @ (position - self.points(place))
+        return moved + place, np.array(multiply(conjugate(tangent), quaternion))
