@@ -15,6 +15,8 @@ import numpy as np
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.quaternion import conjugate, multiply
 
+#: Steps of Newton's method along rays, and the step of its slope [m]: exact to 1e-9 m at a radius of 1.5 m.
+HIT_STEPS, STEP_M = 5, 1e-5
 if TYPE_CHECKING:
     from sim.world.scene import SurfaceScene
 
@@ -59,6 +61,27 @@ class Surface(ABC):
     def axes(self, place: np.ndarray) -> np.ndarray:
         """Columns (into the wall, right, down) at a place of the chart (3,), in the world, (3, 3)."""
         return rotation_from_quaternion(self.attitude(place))
+
+    def hit(self, origin: np.ndarray, directions: np.ndarray, place: np.ndarray, depth: float = 0.0) -> np.ndarray:
+        """Ways along rays to the surface or to a depth behind it, by Newton's method.
+
+        Args:
+            origin: Common origin of the rays, in the world [m], (3,).
+            directions: (..., 3).
+            place: Place of the chart whose tangent plane is near the rays' ends, (3,).
+            depth: Depth of the ends [m].
+
+        Returns:
+            Multiples of the directions, (...).
+        """
+        normal = self.axes(place)[:, 0]
+        ways = (normal @ (self.points(place) - origin) + depth) / (directions @ normal)
+        for _ in range(HIT_STEPS):
+            ends = origin + ways[..., None] * directions
+            before = self.chart(ends)[..., 0]
+            slope = (self.chart(ends + STEP_M * directions)[..., 0] - before) / STEP_M
+            ways = ways - (before - depth) / slope
+        return ways
 
     def flattened(
         self, position: np.ndarray, quaternion: np.ndarray, place: np.ndarray
