@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
+from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
 from ibvs_qp.measurement import FeatureFrame, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.appearance.colors import SurfaceColors
@@ -25,7 +25,10 @@ from ibvs_qp.vision.lines.tracks import LineTracker
 from ibvs_qp.vision.perception_result import PerceptionResult, make_result
 from ibvs_qp.vision.picture.exposure import ExposureSteps
 from ibvs_qp.vision.picture.picture import Picture
+from ibvs_qp.vision.picture.unrolled import unrolled
+from ibvs_qp.vision.surface.curvature import WallCurvature
 from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.surface.plane import PlaneEstimate
 from ibvs_qp.vision.surface.seeds import UP_LEFT
 from ibvs_qp.vision.surface.tracker import SurfaceTracker
 
@@ -57,15 +60,19 @@ class Perception:
         self._surface = SurfaceTracker(config.plane, self._colors)
         self._tracker, self._flow = LineTracker(config), SparseFlow(config.flow, self._camera_position)
         self._layout: PictureLayout | None = None
+        self._curvature = WallCurvature()
+        tip = self._camera_position if vehicle is None else np.asarray(vehicle.tip_position_m, float)
+        self._tip = to_camera(tip, self._camera_position)
         self._exposure, self._guides = ExposureSteps(), GuideKeeper()
         self._gate = PictureGate(in_flight=vehicle is not None)
         self.reset()
 
     def reset(self) -> None:
         """Start again as new: the same pictures then give the same bits."""
-        parts = (self._gate, self._surface, self._tracker, self._flow, self._colors, self._exposure, self._guides)
-        for part in parts:
+        for part in (self._gate, self._surface, self._curvature, self._tracker, self._flow, self._colors):
             part.reset()
+        self._exposure.reset()
+        self._guides.reset()
         self._grey: np.ndarray | None = None
         self._stamp_ns: int | None = None
         self._missed_turn = np.zeros(3)  # over pictures that were refused [rad]
@@ -135,8 +142,11 @@ class Perception:
         motion = self._motion(frame, rotation, velocity, interval)
         before = None if self._surface.plane is None else self._surface.plane.inverse_depth
         predicted = None if before is None else motion.plane(before)
+        seen, frame = frame, self._unrolled(frame, predicted)
         refused = self._surface.update(frame, layout, predicted, down, seed_pixel)
         plane = self._surface.plane
+        if plane is not None:
+            self._measure_curvature(frame, layout, plane, interval)
         clock.lap("plane")
 
         inverse_depth = None if plane is None else plane.inverse_depth
@@ -149,7 +159,7 @@ class Perception:
         candidates = self._detect(picture, frame, layout, down, tilt, detect)
         clock.lap("detect")
 
-        flow = self._flow.update(frame, layout.excluded, motion, plane, busy=self._since_detection == 0)
+        flow = self._flow.update(seen, layout.excluded, motion, plane, busy=self._since_detection == 0)
         clock.lap("flow")
 
         tracks, least, times = self._tracker.tracks, self._config.track.confidence_min, clock.times
@@ -164,6 +174,20 @@ class Perception:
         if rgb is frame.rgb and depth is frame.depth:
             return frame
         return dataclasses.replace(frame, rgb=rgb, depth=depth)
+
+    def _unrolled(self, frame: RgbdFrame, predicted: np.ndarray | None) -> RgbdFrame:
+        """The picture before the tangent plane at the tip, where the wall is curved."""
+        curvature = self._curvature.seen()
+        if curvature is None or predicted is None:
+            return frame
+        return unrolled(frame, predicted, curvature, self._tip)
+
+    def _measure_curvature(
+        self, frame: RgbdFrame, layout: PictureLayout, plane: PlaneEstimate, interval: float
+    ) -> None:
+        grid = layout.sparse_grid
+        if plane.component.shape == grid.shape:  # a surface just found is measured in the next picture
+            self._curvature.update(grid, grid.mean_inverse_depth(frame.depth, self._config.plane), plane, interval)
 
     def _laid_out(self, frame: RgbdFrame) -> PictureLayout:
         """Masks and grid of the picture; for another size or camera new ones, and nothing is followed into it."""

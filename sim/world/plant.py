@@ -158,6 +158,7 @@ class Plant(PlantReadings):
             mujoco.mj_step(self.model, self.data, self._steps)
         else:
             for _ in range(self._steps):
+                mujoco.mj_kinematics(self.model, self.data)
                 self._face.touch(self.data.geom_xpos[self._ids.tip])
                 mujoco.mj_step(self.model, self.data)
         self.time_ns += self.tick_ns

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
 from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
@@ -178,6 +180,19 @@ class Scene(Checked):
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
     errors: WorldErrors = field(default_factory=WorldErrors)
+
+    def __post_init__(self) -> None:
+        """The board ends where its normal is `STEEPEST_DEG` off level."""
+        super().__post_init__()
+        surface = self.surface
+        if surface.kind != "cylinder" or surface.axis != "level":
+            return
+        most = 2.0 * surface.radius_m * math.radians(STEEPEST_DEG - abs(surface.lean_deg))
+        if self.board.height_m > most:
+            raise ConfigError(
+                f"board.height_m = {self.board.height_m:g} m is refused: allowed is at most {most:.3g} m, where the "
+                f"normal of a wall of surface.radius_m = {surface.radius_m:g} m is {STEEPEST_DEG:g} deg off level"
+            )
 
 
 def load_scene(file: str | Path) -> Scene:

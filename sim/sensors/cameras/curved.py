@@ -1,4 +1,4 @@
-"""Camera before a curved wall: the picture before its tangent plane, moved pixel by pixel to where the wall shows it."""
+"""Camera before a curved wall: the picture before its tangent plane, each pixel moved to where the wall shows it."""
 
 from __future__ import annotations
 
