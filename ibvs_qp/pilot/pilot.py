@@ -274,7 +274,7 @@ class Pilot(Rebuilt):
         # plan
         limits = supervision.limits(self.thrust_limits)
         target = planning.plan(estimation, supervision, limits, setpoints.push_reference, dt, rejected)
-        self.reference = supervision.reference(planning.reference(target, contact))
+        self.reference = supervision.reference(planning.reference(target, contact, estimation.estimator.curvature))
         # measure
         turning = supervision.rotor_loss.lost
         drifting = turning or supervision.state not in FLYING

@@ -164,7 +164,17 @@ class Perception:
 
         tracks, least, times = self._tracker.tracks, self._config.track.confidence_min, clock.times
         return make_result(
-            frame, tracks, plane, flow, tuple(candidates), refused, layout.mask, times, self._guides, least
+            frame,
+            tracks,
+            plane,
+            flow,
+            tuple(candidates),
+            refused,
+            layout.mask,
+            times,
+            self._guides,
+            least,
+            self._curvature.unrolled_by,
         )
 
     def _plain(self, frame: RgbdFrame) -> RgbdFrame:

@@ -55,6 +55,7 @@ def make_result(
     times: dict[str, float],
     guides: GuideKeeper | None = None,
     least_confidence: float = 0.0,
+    curvature: np.ndarray | None = None,
 ) -> PerceptionResult:
     """Result of one picture; only confirmed and certain tracks of positive weight become features."""
     tracks = tuple(track.state() for track in followed)
@@ -85,6 +86,7 @@ def make_result(
         velocity=None if moving is None else moving.velocity,
         velocity_covariance=None if moving is None else moving.covariance,
         velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
+        curvature=curvature,
     )
     return PerceptionResult(
         features=features,

@@ -69,7 +69,9 @@ class World:
         position, quaternion, *motion = self._seen_from
         if self.stream is None:  # lines are reported as tangents at the tip
             place = np.array((0.0, *self.plant.tip_on_wall))
-            position, quaternion = self.geometry.surface.flattened(position, quaternion, place)
+            surface = self.geometry.surface
+            position, quaternion = surface.flattened(position, quaternion, place)
+            self._features.curvature = None if surface.flat else surface.curvature_tensor(place)
         pose, seen = self._mount.pose(position, quaternion), [self._mount.velocity(part) for part in motion]
         if self.stream is None:
             return self.sensors.sample(plant, None, self._mount.features(self._features.tick(now, *pose, *seen)))

@@ -32,6 +32,7 @@ class WallCurvature:
     Attributes:
         value: Entries (right right, right down, down down) [1/m], (3,), > 0 where the wall bulges towards the camera.
         covariance: Their covariance, (3, 3).
+        unrolled_by: Curvature by which the last picture was unrolled, (3,), a cylinder's; None before a flat wall.
     """
 
     def __init__(self) -> None:
@@ -40,7 +41,7 @@ class WallCurvature:
     def reset(self) -> None:
         """Start again as new: flat, and unknown."""
         self.value, self.covariance, self._curved = np.zeros(3), UNKNOWN * np.eye(3), False
-        self._unrolled_by = np.zeros(3)
+        self.unrolled_by: np.ndarray | None = None
 
     def seen(self) -> np.ndarray | None:
         """The curvature by which to unroll the next picture, (3,), of a cylinder; None before a flat wall."""
@@ -48,12 +49,12 @@ class WallCurvature:
         sigma = math.sqrt(float(self.covariance[[0, 2], [0, 2]].max()))
         self._curved = size > max(FLAT if self._curved else CURVED, CERTAIN * sigma)
         if not self._curved:
-            self._unrolled_by = np.zeros(3)
+            self.unrolled_by = None
             return None
         kappa, angle = principal(self.value)
         c, s = math.cos(angle), math.sin(angle)
-        self._unrolled_by = kappa * np.array((c * c, c * s, s * s))
-        return self._unrolled_by
+        self.unrolled_by = kappa * np.array((c * c, c * s, s * s))
+        return self.unrolled_by
 
     def update(self, grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, interval_s: float) -> None:
         """Take in a picture.
@@ -89,6 +90,7 @@ class WallCurvature:
         residual = left - columns @ solved
         variance = float(residual @ residual) / (len(chosen) - 6.0)
         noise = CORRELATED * variance * spread[3:, 3:]
+        removed = np.zeros(3) if self.unrolled_by is None else self.unrolled_by
         gain = self.covariance @ np.linalg.inv(self.covariance + noise)
-        self.value = self.value + gain @ (self._unrolled_by + solved[3:] - self.value)
+        self.value = self.value + gain @ (removed + solved[3:] - self.value)
         self.covariance = self.covariance - gain @ self.covariance

@@ -58,6 +58,11 @@ class Surface(ABC):
     def curvature(self, place: np.ndarray) -> np.ndarray:
         """Normal curvatures along right and down at a place (3,) [1/m], (2,): > 0 bulges towards the vehicle."""
 
+    def curvature_tensor(self, place: np.ndarray) -> np.ndarray:
+        """The same as entries (right right, right down, down down), (3,)."""
+        right, down = self.curvature(place)
+        return np.array((right, 0.0, down))
+
     def axes(self, place: np.ndarray) -> np.ndarray:
         """Columns (into the wall, right, down) at a place of the chart (3,), in the world, (3, 3)."""
         return rotation_from_quaternion(self.attitude(place))
