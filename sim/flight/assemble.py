@@ -114,7 +114,7 @@ def _truth(flown: Flown, truth: np.ndarray) -> dict[str, np.ndarray]:
     every = ticks_in(CLEARANCE_S, flown.config.controller.tick_s)
     rare = slice(None, None, every)
     board = BoardGeometry(flown.scene)
-    tip = board.surface.chart(position + rotation @ np.array(flown.vehicle.tip_position_m))
+    tip = truth[:, PLACES["tip"]].copy()
     clearance = flown.clearance.distances(position[rare], rotation[rare])
     return {
         "position": position.copy(),

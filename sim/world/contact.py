@@ -59,6 +59,18 @@ def set_contact(model: mujoco.MjModel, *, stiffness: float, damping: float, fric
     model.pair_margin[pair] = model.pair_gap[pair] = 0.0
 
 
+def set_stiffness(model: mujoco.MjModel, stiffness: float) -> None:
+    """Change the stiffness of a model's contact pair [N/m]."""
+    pair, scale = _pair(model)
+    model.pair_solref[pair, 0] = -stiffness * scale
+
+
+def set_friction(model: mujoco.MjModel, friction: float) -> None:
+    """Change the Coulomb coefficient of a model's contact pair."""
+    pair, _ = _pair(model)
+    model.pair_friction[pair, :2] = friction
+
+
 def contact_stiffness(model: mujoco.MjModel) -> float:
     """Stiffness K of a model's contact pair [N/m]."""
     pair, scale = _pair(model)

@@ -57,19 +57,23 @@ class Face:
             return None
         self.on_board = on_board
         if on_board:
-            self._place[0] = 0.0  # of a plane; `touch` follows on other surfaces
+            self._place[0] = 0.0  # of a plane; `lay` follows on other surfaces
             return "tip struck the board's edge" if depth > self._left_at + TIP_RADIUS_M else None
         self._place[0], self._left_at = size.gap_m, max(depth, 0.0)
         return None
 
-    def touch(self, sphere: np.ndarray) -> None:
-        """Lay the plane of a curved wall at the place nearest to the tip's sphere.
+    def lay(self, place: np.ndarray, height: float, slopes: Sequence[float]) -> None:
+        """Lay the plane at the place nearest to the tip's sphere.
 
         Args:
-            sphere: Its middle, front-left-up in the world [m], (3,).
+            place: That place in the chart, of which the depth does not count, (3,).
+            height: Of the relief there, towards the vehicle [m].
+            slopes: Of the relief, along and up on the board, (2,).
         """
-        surface = self._board.surface
-        place = surface.chart(FLIP * sphere)
-        place[0] = 0.0 if self.on_board else self._board.scene.board.gap_m
-        self._place[:] = FLIP * surface.points(place)
-        mujoco.mju_quatZ2Vec(self._quaternion, -FLIP * surface.axes(place)[:, 0])
+        board = self._board
+        surface, foot = board.surface, np.array(place)
+        foot[0] = (0.0 if self.on_board else board.scene.board.gap_m) - height
+        self._place[:] = FLIP * surface.points(foot)
+        along, up = slopes
+        rise = along * board.along + up * board.up  # in (y, z) of the chart
+        mujoco.mju_quatZ2Vec(self._quaternion, -FLIP * (surface.axes(foot) @ (1.0, *rise)))

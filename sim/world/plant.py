@@ -16,16 +16,17 @@ from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason, has_landed
 from sim.world.errors import RotorErrors
-from sim.world.face import Face
+from sim.world.face import TIP_RADIUS_M, Face
 from sim.world.mjcf import STEP_NS, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
-from sim.world.random_streams import stream
 from sim.world.readings import PlantReadings
 from sim.world.readout import PLACES, SIZE, drive, readout
 from sim.world.rotor_errors import ThrustFactors
 from sim.world.scene import Scene
+from sim.world.touch import Touch
 from sim.world.trim import hover_thrusts, start_pose
 from sim.world.true_vehicle import true_vehicle
+from sim.world.wall_air import WallAir
 from sim.world.wind import Wind
 
 #: Crash reason after a non-finite command; physics stops from then on.
@@ -77,11 +78,16 @@ class Plant(PlantReadings):
         self._board = board = BoardGeometry(scene)
         self.clearance = PropellerClearance(board, self.vehicle)
         face = self._ids.face
+        self._flexible = scene.errors.arm.mode_hz > 0.0
         self._face = Face(board, self.model.geom_pos[face], self.model.geom_quat[face])
+        self._touch = Touch(board, self._face, self.model, self._ids, seed)
         drag = self.vehicle.linear_drag_n_s_m
-        self.wind = Wind(scene.wind, board.from_ned, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
+        self.wind = Wind(scene.wind, scene.errors.air, board.from_ned, drag, self.tick_ns * 1e-9, seed)
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
         self._factors = ThrustFactors(rotors, count, self.tick_ns * 1e-9, seed) if rotors != RotorErrors() else None
+        air = scene.errors.air
+        disturbed = air.wall_thrust or air.ground_thrust or air.recirculation
+        self._wall_air = WallAir(air, board, self.vehicle, self.tick_ns * 1e-9, seed) if disturbed else None
         self.time_ns = 0
         self.crashed: str | None = None
         self.landed = False
@@ -101,7 +107,7 @@ class Plant(PlantReadings):
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
             readout(model.nhistory, *ids.remembered, self._steps),
-            (data.qpos, data.qvel, data.history, points),
+            (data.qpos[:7], data.qvel[:6], data.history, points),  # a flexible arm has further ones
             (self.truth, self.pushes),
         )
         self._commanded, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
@@ -131,6 +137,10 @@ class Plant(PlantReadings):
         """Read the state; tip and friction in the chart."""
         self._read()
         surface = self._board.surface
+        if self._flexible:
+            mujoco.mj_kinematics(self.model, self.data)
+            tip, ahead = self.data.geom_xpos[self._ids.tip], self.data.geom_xmat[self._ids.tip][::3]
+            self.truth[_TIP] = FLIP * (tip + TIP_RADIUS_M * ahead)
         if surface.flat:
             return
         chart = surface.chart(self.truth[_TIP])
@@ -147,19 +157,22 @@ class Plant(PlantReadings):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + self.tick_ns
             return
         commanded = thrusts * self.gain
-        self._commanded[:] = commanded if self._factors is None else commanded * self._factors.next()
-        self._air[:] = self.wind.force(self._centre_velocity.tolist())
+        if self._factors is not None:
+            commanded = commanded * self._factors.next()
+        if self._wall_air is not None:
+            commanded = commanded * self._wall_air.factors(self.position, self.rotation)
+        self._commanded[:] = commanded
+        self._air[:] = self.wind.force(self._centre_velocity.tolist(), -self.truth.item(_FALL.start))
         if self.outer_force is not None:
             self._air += self.outer_force
         self._drive()
         self._lag[:] = self._lags
         struck = self._face.follow(self.truth[_TIP].tolist())
-        if self._board.surface.flat:
+        if not self._touch.needed:
             mujoco.mj_step(self.model, self.data, self._steps)
         else:
             for _ in range(self._steps):
-                mujoco.mj_kinematics(self.model, self.data)
-                self._face.touch(self.data.geom_xpos[self._ids.tip])
+                self._touch.prepare(self.data)
                 mujoco.mj_step(self.model, self.data)
         self.time_ns += self.tick_ns
         self._sense()
