@@ -1,4 +1,4 @@
-"""What stands out of the wall: rivets, seams and steps, as heights over the chart."""
+"""Relief of the wall: rivets, seams and steps, as heights over the chart."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ LEAST, UNKNOWN = 60, 1.0
 
 
 class WallCurvature:
-    """Kalman filter of the curvature, whose measurement is what is left over in unrolled pictures.
+    """Kalman filter of the curvature, whose measurement is the remaining curvature of unrolled pictures.
 
     Attributes:
         value: Entries (right right, right down, down down) [1/m], (3,), > 0 where the wall bulges towards the camera.

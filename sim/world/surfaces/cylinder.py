@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.world.surfaces.surface import Surface
-
-if TYPE_CHECKING:
-    from sim.world.scene import SurfaceScene
+from sim.world.surfaces.surface import Shape, Surface
 
 
 class Cylinder(Surface, kind="cylinder"):
@@ -22,7 +18,7 @@ class Cylinder(Surface, kind="cylinder"):
     .. math:: x = \sigma (R - \rho \cos(s / R)), \quad y = \rho \sin(s / R), \quad \rho = R - \sigma d
     """
 
-    def __init__(self, middle: np.ndarray, settings: SurfaceScene) -> None:
+    def __init__(self, middle: np.ndarray, settings: Shape) -> None:
         self._radius, self._sign = settings.radius_m, -1.0 if settings.hollow else 1.0
         self._around = 1 if settings.axis == "upright" else 2  # index of the coordinate that goes around the axis
         self._middle = float(middle[self._around - 1])

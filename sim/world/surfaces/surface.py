@@ -8,7 +8,7 @@ wall in the middle of the board. On a plane chart and world are the same.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -17,11 +17,27 @@ from ibvs_qp.quaternion import conjugate, multiply
 
 #: Steps of Newton's method along rays, and the step of its slope [m]: exact to 1e-9 m at a radius of 1.5 m.
 HIT_STEPS, STEP_M = 5, 1e-5
-if TYPE_CHECKING:
-    from sim.world.scene import SurfaceScene
-
 #: Kinds of surfaces by name.
 KINDS: dict[str, type[Surface]] = {}
+
+
+class Shape(Protocol):
+    """Settings of a surface, as the scene's section ``surface`` has them."""
+
+    @property
+    def radius_m(self) -> float:
+        """Radius [m]."""
+        ...
+
+    @property
+    def axis(self) -> str:
+        """Direction of the axis: upright or level."""
+        ...
+
+    @property
+    def hollow(self) -> bool:
+        """Whether it bends towards the vehicle."""
+        ...
 
 
 class Surface(ABC):
@@ -35,7 +51,7 @@ class Surface(ABC):
     #: Whether chart and world are the same.
     flat: ClassVar[bool] = False
 
-    def __init__(self, middle: np.ndarray, settings: SurfaceScene) -> None:  # noqa: B027
+    def __init__(self, middle: np.ndarray, settings: Shape) -> None:  # noqa: B027
         """Nothing by default."""
 
     def __init_subclass__(cls, kind: str) -> None:
