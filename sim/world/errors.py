@@ -149,7 +149,7 @@ class AirErrors(Checked):
 class ArmErrors(Checked):
     """A flexible arm: tool and brush swing about the force/torque sensor."""
 
-    mode_hz: float = _size("frequency of the swing with a free tip, 0 for a rigid arm", "Hz", 200.0)
+    mode_hz: float = _size("frequency of the swing of a free tip at a clamped vehicle, 0 for a rigid arm", "Hz", 200.0)
     damping: float = setting(0.02, "its damping ratio", low=0.0, high=1.0)
 
 

@@ -55,7 +55,7 @@ class Relief:
         for index in np.flatnonzero(np.abs(along - self._seams) < SEAM_M).tolist():
             aside = along - float(self._seams[index])
             bump, slope = _bump(abs(aside), SEAM_M, float(self._seam_m[index]))
-            height, slope_along = height + bump, slope_along + math.copysign(slope, aside)
+            height, slope_along = height + bump, slope_along + slope * math.copysign(1.0, aside)
         if self._step_m:
             ramp = min(max((along - self._step_at) / STEP_M, 0.0), 1.0)
             height += self._step_m * 0.5 * (1.0 - math.cos(math.pi * ramp))
