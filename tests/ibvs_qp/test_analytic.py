@@ -88,7 +88,7 @@ def test_the_wrench_is_the_law_by_hand(lines: int, weight: float) -> None:
 
 
 def test_full_contact_keeps_the_force_command() -> None:
-    """Lambda' = lambda n n^T: along n exactly the push accelerates the tip. The printed R diag(0,0,lambda) would cancel it."""
+    """Lambda' = lambda n n^T: along n the push alone accelerates the tip. The printed R diag(0,0,lambda) cancels it."""
     for seed in range(10):
         setpoints = terms_of(seed, 2, 1.0)
         wrench, tip = analytic_wrench(setpoints), CONFIG.vehicle.tip_position_m
