@@ -289,7 +289,10 @@ class Pilot(Rebuilt):
             planning.note(*event)
         # supervise
         self._commanded = supervision.explained(command)
+        noted = supervision.rotor_note
         supervision.watch(self._tick(frame, contact, command), setpoints)
+        if supervision.rotor_note != noted:
+            planning.note("rotor", supervision.rotor_note)
         return self._commanded
 
     def _advance(self, stamp_ns: int) -> float:
