@@ -223,6 +223,7 @@ class Model:
             "thrust_lower": self.thrust_lower,
             "thrust_upper": self.thrust_upper,
             "contact_weight": self.contact_weight,
+            "turning_lever": self.turning_lever,
         }.items():
             self.output(name, value)
 
@@ -260,8 +261,14 @@ class Model:
 
     @property
     def force_along_normal(self) -> ca.SX:
-        """Net force without contact along n, as a function of the thrusts [N]."""
-        return ca.dot(self.normal, self.wrench[:3])
+        """Mass times the tip's acceleration along n without contact, as a function of the thrusts [N]."""
+        return ca.dot(self.normal, self.wrench[:3]) + ca.dot(self.turning_lever, self.acceleration[3:])
+
+    @property
+    def turning_lever(self) -> ca.SX:
+        """Mass times the tip's acceleration along n per angular acceleration [kg m], (3,): zero before a level wall."""
+        vehicle = self.config.vehicle
+        return vehicle.mass_kg * ca.cross(ca.DM(vehicle.tip_position_m), self.normal)
 
     @property
     def body_rotation_gain(self) -> ca.SX:

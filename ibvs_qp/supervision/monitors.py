@@ -62,6 +62,11 @@ COMMON = 3
 RISE_N_S = 2.0
 #: Half width of the remaining limits of a stuck rotor [N].
 MARGIN = 0.5
+#: A single rotor that gives at least this fraction of its thrust is weak, by its blades or its drive: its scale is
+#: changed. One that gives less is stuck or lost; so is one that its scale does not explain after so many changes.
+LEAST_SCALE, MOST_CHANGES = 0.5, 2
+#: Time after a change of the scale in which motors and filters settle [s]; changes this far apart count as new.
+SETTLING_S, FORGOTTEN_S = 0.25, 2.0
 
 
 @dataclass(slots=True, kw_only=True)
@@ -370,6 +375,8 @@ class RotorMonitor:
     Attributes:
         limits: Lower and upper thrusts of faulty rotors, vehicle limits for the others [N], (n,) each; None while no
             rotor is faulty.
+        scale: Thrust of every rotor over that commanded, of weak rotors below 1, (n,).
+        note: Last change of the scale in words; empty before the first.
 
     Args:
         vehicle: Names and limits of the rotors.
@@ -397,6 +404,8 @@ class RotorMonitor:
         self._found: dict[str, float] = {}
         self._strong = set[int]()  # of them those that gave too much
         self._time_s = 0.0
+        self.scale, self.note = np.ones(len(self._names)), ""
+        self._changes: list[tuple[float, int]] = []  # of the scale: times [s] and rotors
 
     def update(self, missing: np.ndarray, noise: float, thrusts: np.ndarray, time_s: float) -> str:
         """Rotors that miss thrust, in words.
@@ -438,16 +447,45 @@ class RotorMonitor:
         return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
+        if self._changes and time_s - self._changes[-1][0] < SETTLING_S and self._gives_enough(missing, thrusts):
+            self._suspects.clear()
+            return
         # While one rotor is followed, its remaining deficit must not be ascribed to a pair.
         rotors = self._explain(missing, 1 if len(self._found) == 1 else MOST_ROTORS)
         self._suspects = {rotor: self._suspects.get(rotor, time_s) for rotor in rotors}
-        for rotor, since in self._suspects.items():
+        for rotor, since in list(self._suspects.items()):
             # A rotor joins those found once it was suspected itself for long enough: while thrusts are shared out
             # anew, others miss some for a tick.
             if self._names[rotor] not in self._found and time_s - since < self._settings.missing_time_s:
                 continue
             loss = float(missing[rotor] / self._signatures[rotor, rotor])
-            self._limit(rotor, float(thrusts[rotor]) - loss, loss)
+            if self._found or len(rotors) > 1 or not self._rescale(rotor, loss, float(thrusts[rotor]), time_s):
+                self._limit(rotor, float(thrusts[rotor]) - loss, loss)
+
+    def _gives_enough(self, missing: np.ndarray, thrusts: np.ndarray) -> bool:
+        """Whether the rotor whose scale was changed last has not stopped."""
+        rotor = self._changes[-1][1]
+        given = float(thrusts[rotor] - missing[rotor] / self._signatures[rotor, rotor])
+        return given > LEAST_SCALE * float(thrusts[rotor])
+
+    def _rescale(self, rotor: int, loss: float, thrust: float, time_s: float) -> bool:
+        """Change the scale of a weak rotor; False for one that is no such.
+
+        ``loss`` is its missing thrust and ``thrust`` that of the motors' model, with the scale of before [N].
+        """
+        self._changes = [change for change in self._changes if time_s - change[0] < FORGOTTEN_S]
+        ratio = (thrust - loss) / max(thrust, LEAST_SCALE)
+        scale = min(float(self.scale[rotor]) * ratio, 1.0)
+        again = sum(other == rotor for _, other in self._changes) >= MOST_CHANGES
+        if again or scale < LEAST_SCALE or scale == self.scale[rotor]:
+            self.scale[rotor] = 1.0
+            return False
+        self.scale = self.scale.copy()
+        self.scale[rotor] = scale
+        self._changes.append((time_s, rotor))
+        self._suspects.clear()
+        self.note = f"{self._names[rotor]} gives {100.0 * scale:.0f} % of its thrust"
+        return True
 
     def _explain(self, missing: np.ndarray, most: int) -> Sequence[int]:
         """Fewest rotors, ``most`` at most, whose missing thrusts explain the missing force; empty if they do not."""

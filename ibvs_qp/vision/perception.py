@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
+from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
 from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.appearance.colors import SurfaceColors
@@ -25,6 +25,8 @@ from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.lines.tracks import LineHint, LineTracker, TrackState
 from ibvs_qp.vision.picture.layout import UP_LEFT, PictureLayout
 from ibvs_qp.vision.picture.picture import ExposureSteps, Picture
+from ibvs_qp.vision.picture.unrolled import unrolled
+from ibvs_qp.vision.surface.curvature import WallCurvature
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 from ibvs_qp.vision.surface.tracker import SurfaceTracker
 
@@ -85,13 +87,16 @@ class Perception:
         self._surface, self._tracker = SurfaceTracker(config.plane, self._colors), LineTracker(config, self._colors)
         self._points, self._flow = SurfaceMotion(), SparseFlow(config.flow, self._camera_position)
         self._layout: PictureLayout | None = None
+        self._curvature = WallCurvature()
+        tip = self._camera_position if vehicle is None else np.asarray(vehicle.tip_position_m, float)
+        self._tip = to_camera(tip, self._camera_position)
         self._exposure, self._guides = ExposureSteps(), GuideKeeper()
         self._gate = PictureGate(in_flight=vehicle is not None)
         self.reset()
 
     def reset(self) -> None:
         """Start again as new: the same pictures then give the same bits."""
-        stages = (self._surface, self._tracker, self._points, self._flow, self._guides)
+        stages = (self._surface, self._curvature, self._tracker, self._points, self._flow, self._guides)
         for part in (self._gate, self._exposure, self._colors, *stages):
             part.reset()
         self._stamp_ns: int | None = None
@@ -161,9 +166,12 @@ class Perception:
         predicted = None if before is None else motion.plane(before)
 
         down = None if attitude is None else R_BODY_CAMERA.T @ np.array(down_in_body(attitude))
+        seen, frame = frame, self._unrolled(frame, predicted)
         picture = Picture(frame, layout, down)
         refused = self._surface.find_surface(picture, predicted, seed_pixel)
         plane = self._surface.plane
+        if plane is not None:
+            self._measure_curvature(frame, layout, plane, interval)
         picture.plane = None if plane is None else plane.abcd[:3]
         clock.lap("plane")
 
@@ -175,11 +183,11 @@ class Perception:
         candidates = self._detect(picture, detect)
         clock.lap("detect")
 
-        flow = self._flow.measure_velocity(frame, layout.excluded, motion, plane, busy=self._since_detection == 0)
+        flow = self._flow.measure_velocity(seen, layout.excluded, motion, plane, busy=self._since_detection == 0)
         clock.lap("flow")
 
         tracks = self._tracker.tracks
-        features = make_features(frame.stamp_ns, tracks, plane, flow, self._config.track.confidence_min)
+        features = make_features(frame.stamp_ns, tracks, plane, flow, self._config.track.confidence_min, self._curvature.unrolled_by)
         kept = tuple(map(copy.copy, tracks))
         return PerceptionResult(
             features=features,
@@ -201,6 +209,20 @@ class Perception:
         if rgb is frame.rgb and depth is frame.depth:
             return frame
         return dataclasses.replace(frame, rgb=rgb, depth=depth)
+
+    def _unrolled(self, frame: RgbdFrame, predicted: np.ndarray | None) -> RgbdFrame:
+        """The picture before the tangent plane at the tip, where the wall is curved."""
+        curvature = self._curvature.seen()
+        if curvature is None or predicted is None:
+            return frame
+        return unrolled(frame, predicted, curvature, self._tip)
+
+    def _measure_curvature(
+        self, frame: RgbdFrame, layout: PictureLayout, plane: PlaneEstimate, interval: float
+    ) -> None:
+        grid = layout.sparse_grid
+        if plane.component.shape == grid.shape:  # a surface just found is measured in the next picture
+            self._curvature.update(grid, grid.mean_inverse_depth(frame.depth), plane, interval)
 
     def _laid_out(self, frame: RgbdFrame) -> PictureLayout:
         """Masks and grid of the picture; for another size or camera new ones, and nothing is followed into it."""
@@ -244,6 +266,7 @@ def make_features(
     plane: PlaneEstimate | None,
     flow: FlowVelocity | str,
     least_certainty: float = 0.0,
+    curvature: np.ndarray | None = None,
 ) -> FeatureFrame:
     """Features of one picture: of its tracks the confirmed and certain ones of positive weight, seen or not."""
     lines = tuple(
@@ -270,6 +293,7 @@ def make_features(
         velocity=None if moving is None else moving.velocity,
         velocity_covariance=None if moving is None else moving.covariance,
         velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
+        curvature=curvature,
     )
 
 

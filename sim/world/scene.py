@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
 from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
+from sim.world.surfaces import KINDS
 
 Color = tuple[int, int, int]
+#: Steepest wall: angle of its normal to the horizon [deg].
+STEEPEST_DEG = 15.0
 #: Nominal rates and delays of the sensors.
 _SENSORS = channels(SensorFrame)
 _IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
@@ -32,6 +37,23 @@ class BoardScene(Checked):
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
     clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)
     texture_seed: int = setting(0, "seed of textures and clutter, mixed with the flight's seed", low=0, high=2**31 - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceScene(Checked):
+    """The shape of wall and board; a plane has no radius."""
+
+    kind: str = choice("plane", "shape", tuple(KINDS))
+    lean_deg: float = setting(
+        0.0,
+        "lean in the middle of the board, + with the top away from the vehicle",
+        unit="deg",
+        low=-STEEPEST_DEG,
+        high=STEEPEST_DEG,
+    )
+    radius_m: float = setting(3.0, "radius", unit="m", low=1.5, high=1000.0)
+    axis: str = choice("upright", "direction of the axis of a cylinder", ("upright", "level"))
+    hollow: bool = setting(False, "the wall bends towards the vehicle, as inside a tank")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,6 +168,7 @@ class Scene(Checked):
     """One complete scene; every section and key has a default."""
 
     board: BoardScene = field(default_factory=BoardScene)
+    surface: SurfaceScene = field(default_factory=SurfaceScene)
     wall: WallScene = field(default_factory=WallScene)
     paint: PaintScene = field(default_factory=PaintScene)
     start: StartScene = field(default_factory=StartScene)
@@ -157,6 +180,19 @@ class Scene(Checked):
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
     errors: WorldErrors = field(default_factory=WorldErrors)
+
+    def __post_init__(self) -> None:
+        """The board ends where its normal is `STEEPEST_DEG` off level."""
+        super().__post_init__()
+        surface = self.surface
+        if surface.kind != "cylinder" or surface.axis != "level":
+            return
+        most = 2.0 * surface.radius_m * math.radians(STEEPEST_DEG - abs(surface.lean_deg))
+        if self.board.height_m > most:
+            raise ConfigError(
+                f"board.height_m = {self.board.height_m:g} m is refused: allowed is at most {most:.3g} m, where the "
+                f"normal of a wall of surface.radius_m = {surface.radius_m:g} m is {STEEPEST_DEG:g} deg off level"
+            )
 
 
 def load_scene(file: str | Path) -> Scene:

@@ -7,50 +7,89 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.world.random_streams import Normals
+from sim.world.errors import AirErrors
+from sim.world.random_streams import Normals, stream
 from sim.world.scene import WindScene
 
 #: Correlation time of the gusts [s], Dryden-like (design, section 5).
 GUST_TIME_CONSTANT_S = 1.0
+#: Height at which the mean wind is stated [m], a usual board's, and lowest one of the law over height.
+REFERENCE_M, LOWEST_M = 1.5, 0.1
+#: Time from the beginning of a front to that of its end [s]; assumed.
+FRONT_S = 5.0
 
 
 class Wind:
     r"""Drag in a mean wind plus a first-order Gauss-Markov gust force per world axis.
 
     The gust is :math:`g_{k+1} = a g_k + \sigma \sqrt{1 - a^2}\, n_k`, a = exp(-dt / tau); it starts in its
-    stationary distribution. Attribute ``mean`` (world NED [m/s]) may be changed at any time, or by `change`.
+    stationary distribution. Attribute ``mean`` (world [m/s]) may be changed at any time, or by `change`.
 
     Args:
         scene: Mean wind [m/s] (NED) and gust force [N rms per axis].
+        air: Further wind, drawn from the seed, and fronts.
+        from_ned: Rotation from NED to the world, (3, 3).
         linear_drag: Force per airspeed [N s/m].
         tick_s: Time between calls of `force` [s].
-        generator: Source of the gusts.
+        seed: Seed of the flight.
     """
 
-    def __init__(self, scene: WindScene, linear_drag: float, tick_s: float, generator: np.random.Generator) -> None:
-        self.mean = np.array(scene.mean_m_s)
+    def __init__(
+        self,
+        scene: WindScene,
+        air: AirErrors,
+        from_ned: np.ndarray,
+        linear_drag: float,
+        tick_s: float,
+        seed: int,
+    ) -> None:
+        self._draw, self._air = stream(seed, "errors.air.wind"), air
+        steady = self._level(air.wind_m_s * float(self._draw.uniform())) + scene.mean_m_s
+        self._from_ned, self._steady, self.mean = from_ned, steady, from_ned @ steady
+        self._front_s = float(self._draw.exponential(air.front_every_s)) if air.front_m_s else math.inf
+        self._passing, self._time_s = False, 0.0
         self._drag, self._tick_s = linear_drag, tick_s
         self._steps: list[np.ndarray] = []  # means of the ticks to come, the last first
-        self._rms = scene.gust_n_rms
+        self._rms = math.hypot(scene.gust_n_rms, float(self._draw.uniform(*air.gust_n)))
         self._decay = math.exp(-tick_s / GUST_TIME_CONSTANT_S)
         self._kick = self._rms * math.sqrt(1.0 - self._decay**2)
-        self._normals = Normals(generator)
+        self._normals = Normals(stream(seed, "wind"))
         self._gust = [self._rms * number for number in self._normals.take(3)]
+
+    def _level(self, speed: float) -> np.ndarray:
+        """A wind of some speed in a random level direction, NED [m/s], (3,)."""
+        angle = float(self._draw.uniform(-math.pi, math.pi))
+        return speed * np.array((math.cos(angle), math.sin(angle), 0.0))
+
+    def _pass_front(self) -> None:
+        """A front comes, or has passed."""
+        air = self._air
+        self._passing = not self._passing
+        self.change(self._steady + self._level(air.front_m_s) if self._passing else self._steady, air.front_rise_s)
+        wait = FRONT_S if self._passing else float(self._draw.exponential(air.front_every_s))
+        self._front_s = self._time_s + wait
 
     def change(self, mean_m_s: Sequence[float], rise_s: float) -> None:
         """Change the mean [m/s] (NED) evenly within a time [s]: a front that passes the vehicle."""
         ticks = max(round(rise_s / self._tick_s), 1)
-        self._steps = list(np.linspace(np.array(mean_m_s), self.mean, ticks, endpoint=False))
+        self._steps = list(np.linspace(self._from_ned @ mean_m_s, self.mean, ticks, endpoint=False))
 
-    def force(self, velocity: Sequence[float]) -> tuple[float, float, float]:
-        """Advance the gusts by one tick and return the force of the air, world NED [N].
+    def force(self, velocity: Sequence[float], height_m: float = REFERENCE_M) -> tuple[float, float, float]:
+        """Advance the gusts by one tick and return the force of the air, world [N].
 
         Args:
-            velocity: Velocity of the centre of mass, world NED [m/s], (3,).
+            velocity: Velocity of the centre of mass, world [m/s], (3,).
+            height_m: Above the ground, for the shear.
         """
+        self._time_s += self._tick_s
+        if self._time_s >= self._front_s:
+            self._pass_front()
         if self._steps:
             self.mean = self._steps.pop()
-        mx, my, mz = self.mean.tolist()
+        mean = self.mean
+        if self._air.shear:
+            mean = mean * (max(height_m, LOWEST_M) / REFERENCE_M) ** self._air.shear
+        mx, my, mz = mean.tolist()
         vx, vy, vz = velocity
         drag = self._drag
         if self._rms == 0.0:

@@ -80,18 +80,21 @@ def test_the_wrench_is_the_law_by_hand(lines: int, weight: float) -> None:
             inverse = np.linalg.pinv(matrix, rcond=0.05)
             acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
         servo = MASSES * acceleration
-        selection = np.zeros((6, 6))
-        selection[:3, :3] = weight * np.outer(normal, normal)
-        force = np.concatenate((normal * setpoints.push_command, np.zeros(3)))
-        expected = (np.eye(6) - selection) @ servo + selection @ force
+        tip = MASSES[:3] * (acceleration[:3] + np.cross(acceleration[3:], CONFIG.vehicle.tip_position_m))
+        selection = weight * np.outer(normal, normal)
+        force = normal * setpoints.push_command
+        expected = servo + np.concatenate((selection @ (force - tip), np.zeros(3)))
         np.testing.assert_allclose(analytic_wrench(setpoints), expected, atol=1e-8)
 
 
 def test_full_contact_keeps_the_force_command() -> None:
-    """Lambda' = lambda n n^T: along n exactly the push remains. The printed R diag(0,0,lambda) would cancel it."""
+    """Lambda' = lambda n n^T: along n the push alone accelerates the tip. The printed R diag(0,0,lambda) cancels it."""
     for seed in range(10):
         setpoints = terms_of(seed, 2, 1.0)
-        assert setpoints.normal @ analytic_wrench(setpoints)[:3] == pytest.approx(setpoints.push_command, abs=1e-9)
+        wrench, tip = analytic_wrench(setpoints), CONFIG.vehicle.tip_position_m
+        turning = MASS * np.cross(wrench[3:] / MASSES[3:], tip)
+        along = setpoints.normal @ (wrench[:3] + turning)
+        assert along == pytest.approx(setpoints.push_command, abs=1e-9)
         none = terms_of(seed, 0, 0.0)
         assert none.normal @ analytic_wrench(none)[:3] == pytest.approx(none.standoff_command, abs=1e-9)
 

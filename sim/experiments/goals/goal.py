@@ -1,7 +1,8 @@
-"""One goal: a bound of a figure over flights, or of the median ratio to the flights of before with the same seeds."""
+"""One goal: a bound of a figure over flights, or of its median ratio to reference flights with the same seeds."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import polars as pl
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import choice, validate
 from sim.evaluate.figures import figure_of
+from sim.sweep.design import Run
 from sim.sweep.paired import exact_interval
 from sim.sweep.parts import PARAM
 
@@ -19,8 +21,10 @@ class Goal:
     """A line of ``goals.toml``; exactly one bound is stated."""
 
     kind: str  # of the flights
-    world: str
     figure: str  # of the registry
+    world: str = ""  # of the flights; empty: of the set
+    law: str = "qp"  # of the flights
+    against: str = ""  # kind of the reference flights of a ratio, same world and law; empty: the flights of before
     ratio_at_most: float | None = None
     at_most: float | None = None  # in SI
     at_least: float | None = None
@@ -54,7 +58,7 @@ class Outcome:
 
     Attributes:
         goal: The goal.
-        before: Median of before.
+        before: Median of the reference flights.
         now: Median of the flights that completed, or the figure of the goal.
         ratio: Median ratio of pairs with the same seed.
         interval: Of that median.
@@ -87,7 +91,8 @@ class Outcome:
     def cells(self) -> tuple[str, ...]:
         """Flights and figure, before, now, ratio with its interval, goal, n, and whether it is met."""
         goal, figure = self.goal, figure_of(self.goal.figure)
-        name = f"{goal.kind}, {goal.world}: {figure.words}{', ' if figure.unit else ''}{figure.unit}"
+        cell = ", ".join(filter(None, (goal.kind, goal.world, goal.law)))
+        name = f"{cell}: {figure.words}{', ' if figure.unit else ''}{figure.unit}"
         low, high = self.interval
         ratio = "–" if np.isnan(self.ratio) else f"{self.ratio:.2f} ({low:.2f} to {high:.2f})"
         bounds = {"ratio <=": goal.ratio_at_most, "<=": goal.at_most, ">=": goal.at_least}
@@ -97,24 +102,29 @@ class Outcome:
         return name, *numbers, ratio, bound, f"{self.n} of {self.planned}", "yes" if self.met else "NO"
 
 
-def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int) -> Outcome:
-    """Compare the flights of a goal with those of before, seed by seed.
+def flights_of(goal: Goal, runs: Sequence[Run]) -> list[Run]:
+    """Flights of a design that count for a goal."""
+    wanted = {name: value for name, value in (("kind", goal.kind), ("world", goal.world)) if value}
+    return [run for run in runs if wanted.items() <= run.params.items() and run.law == goal.law]
+
+
+def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame | None, planned: int) -> Outcome:
+    """Compare the flights of a goal with the reference flights, seed by seed.
 
     Args:
         goal: The goal.
         flown: Table of today's flights.
-        before: Flights of before, columns kind, world, seed and figures.
+        before: Flights of before, columns kind, world, seed and figures; None without any.
         planned: Flights of the design.
     """
-    old = before.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
-    column = pl.col(goal.figure).cast(float) if goal.figure in old.columns else pl.lit(None, pl.Float64)
-    old = old.select("seed", column.alias("before"))
-    if not {goal.figure, f"{PARAM}kind"} <= set(flown.columns):
-        columns = {f"{PARAM}kind": str, f"{PARAM}world": str, "seed": int, "completed": bool, goal.figure: float}
-        flown = pl.DataFrame(schema=columns)
-    mine = flown.filter((pl.col(f"{PARAM}kind") == goal.kind) & (pl.col(f"{PARAM}world") == goal.world))
-    counted = mine.filter(pl.col("completed")) if goal.of == "median" else mine
-    now = counted.select("seed", pl.col(goal.figure).cast(float).alias("now"))
+    mine = _cell(goal, goal.kind, flown)
+    if goal.against:
+        old = _cell(goal, goal.against, flown).filter("completed")
+    else:
+        old = _cell(goal, goal.kind, pl.DataFrame() if before is None else before)
+    old = old.select("seed", pl.col(goal.figure).alias("before"))
+    counted = mine.filter("completed") if goal.of == "median" else mine
+    now = counted.select("seed", pl.col(goal.figure).alias("now"))
     now = now.filter(pl.col("now").is_finite())
     both = now.join(old, on="seed")
     ratios = (both["now"] / both["before"]).to_numpy()
@@ -127,6 +137,29 @@ def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame, planned: int)
         interval=exact_interval(ratios) if len(ratios) else (float("nan"), float("nan")),
         n=len(ratios) if goal.ratio_at_most is not None else now.height,
         planned=planned,
+    )
+
+
+def _cell(goal: Goal, kind: str, table: pl.DataFrame) -> pl.DataFrame:
+    """Flights of a kind in the goal's world under its law: columns seed, completed and the figure.
+
+    Args:
+        goal: The goal.
+        kind: Kind of the flights.
+        table: Flights of a sweep, or of before: without laws, they are the QP's and complete.
+    """
+    columns = {"seed": pl.Int64(), "completed": pl.Boolean(), goal.figure: pl.Float64()}
+    table = table.rename({f"{PARAM}kind": "kind", f"{PARAM}world": "world"}, strict=False)
+    if table.is_empty():
+        return pl.DataFrame(schema=columns)
+    for column, value in (("kind", kind), ("world", goal.world), ("law", goal.law)):
+        if value and column in table.columns:
+            table = table.filter(pl.col(column) == value)
+    return table.select(
+        (pl.col(name) if name in table.columns else pl.lit(True if name == "completed" else None))
+        .cast(kind_of)
+        .alias(name)
+        for name, kind_of in columns.items()
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import polars as pl
 import pytest
@@ -11,32 +12,28 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import load_toml
 from sim.evaluate.figures import figure_of
 from sim.experiments.design import Choice, design
-from sim.experiments.law_goals.__main__ import HERE
-from sim.experiments.law_goals.goal import Goal, Goals, outcome
+from sim.experiments.goals.__main__ import HERE, SETS
+from sim.experiments.goals.goal import Goal, Goals, flights_of, outcome
 from sim.experiments.spec import Experiment
 
-BEFORE = pl.read_csv(HERE / "before.csv")
-GOALS = load_toml(Goals, HERE / "goals.toml").goals
+BEFORE = pl.read_csv(HERE / "law" / "before.csv")
+GOALS = {name: load_toml(Goals, HERE / name / "goals.toml").goals for name in SETS}
+RUNS = {
+    name: design(load_toml(Experiment, HERE / name / "flights.toml"), Choice(features="geometric")) for name in SETS
+}
 
 
-@pytest.fixture(scope="module")
-def seeds() -> dict[tuple[str, str], set[int]]:
-    """Seeds of every kind of flights."""
-    found: dict[tuple[str, str], set[int]] = {}
-    for run in design(load_toml(Experiment, HERE / "flights.toml"), Choice(features="geometric")):
-        assert run.law == "qp"
-        found.setdefault((str(run.params["kind"]), str(run.params["world"])), set()).add(run.seed)
-    return found
-
-
-@pytest.mark.parametrize("goal", GOALS, ids=lambda goal: f"{goal.kind}-{goal.world}-{goal.figure}")
-def test_every_goal_has_flights_and_those_of_before(goal: Goal, seeds) -> None:
-    assert len(seeds[goal.kind, goal.world]) == (30 if "gusts of" in goal.kind else 10)
-    assert figure_of(goal.figure).words
-    old = BEFORE.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
-    if goal.ratio_at_most is not None:
-        assert set(old["seed"]) == seeds[goal.kind, goal.world]
-        assert old[goal.figure].null_count() == 0
+@pytest.mark.parametrize("name", SETS)
+def test_every_goal_has_flights_and_those_of_its_reference(name: str) -> None:
+    for goal in GOALS[name]:
+        flights = flights_of(goal, RUNS[name])
+        seeds = {run.seed for run in flights}
+        assert len(flights) >= 10 and figure_of(goal.figure).words
+        old = BEFORE.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
+        if goal.against:
+            assert {run.seed for run in flights_of(replace(goal, kind=goal.against), RUNS[name])} >= seeds, goal
+        elif goal.ratio_at_most is not None:
+            assert set(old["seed"]) == seeds and old[goal.figure].null_count() == 0, goal
 
 
 def flown(factor: float) -> pl.DataFrame:
@@ -70,7 +67,7 @@ def test_a_flight_that_is_missing_or_failed_meets_nothing() -> None:
 
 
 def test_without_flights_no_goal_is_met() -> None:
-    for goal in GOALS:
+    for goal in GOALS["law"]:
         found = outcome(goal, pl.DataFrame(), BEFORE, 10)
         assert found.n == 0 and math.isnan(found.now) and not found.met and "–" in found.cells
 
