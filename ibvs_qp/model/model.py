@@ -261,8 +261,13 @@ class Model:
 
     @property
     def force_along_normal(self) -> ca.SX:
-        """Mass times the tip's acceleration along n without contact, as a function of the thrusts [N]."""
-        return ca.dot(self.normal, self.wrench[:3]) + ca.dot(self.turning_lever, self.acceleration[3:])
+        """Mass times the acceleration along n without contact, as a function of the thrusts [N].
+
+        In contact it is the tip's, in free flight that of the centre of mass: a vehicle that turns away from the wall
+        does not turn to keep its distance.
+        """
+        turning = ca.dot(self.turning_lever, self.acceleration[3:])
+        return ca.dot(self.normal, self.wrench[:3]) + self.contact_weight * turning
 
     @property
     def turning_lever(self) -> ca.SX:

@@ -34,7 +34,7 @@ _REVERSED = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 @dataclass(frozen=True)
 class RefinedLine:
-    """A line fitted to the picture: a record of `LINE`, and what lies beside the line if that was requested."""
+    """A line fitted to the picture: a record of `LINE`, and the values beside the line if they were requested."""
 
     rho: float  # distance from the image centre, normalised
     theta: float  # angle of the normal, within pi/2 of the prediction's [rad]

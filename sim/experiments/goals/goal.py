@@ -104,8 +104,8 @@ class Outcome:
 
 def flights_of(goal: Goal, runs: Sequence[Run]) -> list[Run]:
     """Flights of a design that count for a goal."""
-    wanted = {name: value for name, value in (("kind", goal.kind), ("world", goal.world)) if value}
-    return [run for run in runs if wanted.items() <= run.params.items() and run.law == goal.law]
+    cell = {name: value for name, value in (("kind", goal.kind), ("world", goal.world)) if value}
+    return [run for run in runs if cell.items() <= run.params.items() and run.law == goal.law]
 
 
 def outcome(goal: Goal, flown: pl.DataFrame, before: pl.DataFrame | None, planned: int) -> Outcome:
