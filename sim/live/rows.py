@@ -8,7 +8,7 @@ import numpy as np
 
 from ibvs_qp.command import Command, Outcome, SafetyState
 from ibvs_qp.controller import HybridController
-from ibvs_qp.measurement import SensorFrame
+from ibvs_qp.measurement import FeatureFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.pilot.painting.strategy import PHASES
 from sim.flight.closed_loop import ClosedLoop
@@ -123,6 +123,14 @@ class LiveLoop(ClosedLoop):
     """A flight whose log is bounded."""
 
     recorder_kind = LiveRecorder
+    features: FeatureFrame | None = None
+    """Last lines without pictures."""
+
+    def sense(self) -> SensorFrame:
+        """First half of a tick."""
+        frame = super().sense()
+        self.features = frame.features or self.features
+        return frame
 
     @property
     def recorder(self) -> LiveRecorder:

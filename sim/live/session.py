@@ -48,6 +48,7 @@ class Flight:
 
     Attributes:
         loop: The flight.
+        solver: Name of the solver in use.
         digest: Hash of commands and truth of all its ticks.
 
     Args:
@@ -62,7 +63,7 @@ class Flight:
         self.digest = hashlib.sha256()
         self._every, self._offset = ticks_in(SNAPSHOT_S, self.loop.pilot.config.controller.tick_s), offset
         self._snapshots: list[Snapshot] = []
-        self._blocks, self._solver = Blocks(), self.loop.pilot.config.controller.solver.name
+        self._blocks, self.solver = Blocks(), self.loop.pilot.config.controller.solver.name
         self._keep()
 
     @property
@@ -113,7 +114,7 @@ class Flight:
         """Continue from the newest snapshot up to a tick; returns its tick, which may be earlier."""
         kept = [each for each in self._snapshots if each.ticks <= tick] or self._snapshots[:1]
         self._snapshots, found, loop = kept, kept[-1], self.loop
-        if self._solver != found.solver:
+        if self.solver != found.solver:
             self._use_solver(found.solver)
         loop.pilot.restore(found.pilot)
         found.world.restore()
@@ -131,7 +132,7 @@ class Flight:
             events, roots = list(loop.recorder.events), (loop.world, loop._schedule, loop.pilot._seen_as)
             world = WorldState(roots, (loop.pilot,), self._blocks)
             self._snapshots.append(
-                Snapshot(loop.ticks, pilot, world, loop.command, loop.reason, self._solver, self.digest.copy(), events)
+                Snapshot(loop.ticks, pilot, world, loop.command, loop.reason, self.solver, self.digest.copy(), events)
             )
             del self._snapshots[:-SNAPSHOTS]
 
@@ -151,7 +152,7 @@ class Flight:
         except ImportError as error:
             raise ConfigError(f"solver.name = {name!r}: {error.name} is not installed, of the extra solvers") from None
         law.engine.reset()
-        self._solver = name
+        self.solver = name
 
 
 class Session:

@@ -140,6 +140,12 @@ class Canvas:
         self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
+    def thumbnail(self, pixels_per_m: float) -> np.ndarray:
+        """Painted fraction in 255ths at a coarser resolution, uint8."""
+        self._draw_stamps()
+        part = pixels_per_m / self.pixels_per_m
+        return cv2.resize(_inner(self._coverage), None, fx=part, fy=part, interpolation=cv2.INTER_AREA)
+
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Move the pressed round brush from ``previous`` to ``current``, or dab it down where ``previous`` is None.
 
