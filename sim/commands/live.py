@@ -64,7 +64,8 @@ class Live:
             import viser  # noqa: F401
         except ModuleNotFoundError:
             raise ConfigError("live needs the extra live: pip install -c constraints.txt -e '.[live]'") from None
-        from sim.live.server import LiveServer, open_server
+        from sim.live.server import LiveServer
+        from sim.live.site import open_server
 
         server = open_server(self.host, self.port)
         if self.log is not None:

@@ -24,12 +24,18 @@ class Charts:
         places: Columns of a row by name.
         limits: Names of the prices.
         rotors: Names of the rotors.
+        kept_s: Time that is shown [s].
     """
 
     def __init__(
-        self, gui: viser.GuiApi, places: dict[str, slice], limits: tuple[str, ...], rotors: tuple[str, ...]
+        self,
+        gui: viser.GuiApi,
+        places: dict[str, slice],
+        limits: tuple[str, ...],
+        rotors: tuple[str, ...],
+        kept_s: float = KEPT_S,
     ) -> None:
-        self._gui, self._places, self._limits = gui, places, limits
+        self._places, self._kept_s = places, kept_s
         width = max(place.stop for place in places.values())
         self.rows, self.before = np.empty((0, width)), np.empty((0, width))
         single = {
@@ -64,7 +70,7 @@ class Charts:
         """Append rows; those older than a minute are dropped."""
         if len(rows):
             self.rows = np.concatenate((self.rows, rows))
-            oldest = self.rows[-1, 0] - KEPT_S
+            oldest = self.rows[-1, 0] - self._kept_s
             self.rows = self.rows[self.rows[:, 0] > oldest]
             self.before = self.before[self.before[:, 0] > oldest]
 

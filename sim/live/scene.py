@@ -28,7 +28,7 @@ from sim.world.scene import Scene
 from sim.world.true_vehicle import true_vehicle
 
 #: Length of a drawn newton [m]: of arrows and polytope, and of thrust bars.
-FORCE_M_N, THRUST_M_N = 0.02, 0.008
+FORCE_M_N, THRUST_M_N = 0.02, 0.005
 #: Colours (r, g, b): push, friction, thrusts inside their limits and at one, limits, path, ghost, polytope, camera.
 _PUSH, _FRICTION, _THRUST, _AT_LIMIT = (205, 40, 40), (230, 150, 20), (40, 150, 70), (220, 40, 40)
 _LIMIT, _PATH, _GHOST, _REACH, _CAMERA = (40, 40, 40), (20, 90, 200), (90, 120, 230), (60, 160, 90), (40, 40, 90)
@@ -38,7 +38,7 @@ _NEAR_N = 0.05
 #: Turn of a rotor per frame and newton of thrust [rad/N]: slow enough for the frames.
 _SPIN = 0.06
 #: First view: from behind to the right; direction from the target, and distances that show this radius [m].
-_VIEW, _SEEN_M, _FOV = np.array([-0.5, -0.85, 0.22]), 1.1, math.radians(45.0)
+_VIEW, _SEEN_M, _FOV = np.array([-0.5, -0.85, 0.35]), 1.1, math.radians(45.0)
 #: The wall behind the board is drawn so far beyond its outline, and so thick [m]; paths lie before the face [m].
 _WALL_M, _THIN_M, _BEFORE_M = 0.8, 0.02, 0.004
 
@@ -104,7 +104,7 @@ def vehicle_meshes(scene: Scene, config: PilotConfig) -> tuple[trimesh.Trimesh, 
         color, size = model.geom_rgba[geom], model.geom_size[geom]
         if model.geom_bodyid[geom] not in bodies or color[3] < 0.9:
             continue
-        kind, pose = model.geom_type[geom], np.eye(4)
+        kind, pose = mujoco.mjtGeom(int(model.geom_type[geom])), np.eye(4)
         pose[:3, :3] = axes.T @ data.geom_xmat[geom].reshape(3, 3)
         pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - origin)
         if kind == mujoco.mjtGeom.mjGEOM_BOX:
@@ -176,6 +176,7 @@ class LiveScene:
     def __init__(self, server: viser.ViserServer, scene: Scene, config: PilotConfig) -> None:
         self._server, self._scene, self._config = server, scene, config
         server.scene.set_up_direction("+z")
+        server.scene.configure_default_lights(cast_shadow=False)
         self._board = draw_board(server, scene)
         self.vehicle = vehicle = true_vehicle(scene, config.controller.vehicle, 0)
         body, blades = vehicle_meshes(scene, config)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import logging
 import multiprocessing
 import subprocess
 import sys
@@ -29,52 +26,10 @@ from sim.live.process import fly
 from sim.live.rows import STATES
 from sim.live.scene import LiveScene
 from sim.live.session_file import Start
+from sim.live.site import address, stop
 
 #: Status lines per second [Hz]; longest wait for the first frame, and for the process to end [s].
 _STATUS_HZ, _READY_S, _END_S = 5.0, 120.0, 5.0
-#: Longest line about a message that is ignored [characters].
-_LINE = 200
-
-
-class _OneLine(logging.Handler):
-    """Errors of the websocket server as one line on standard error: hostile messages end their own connection."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print the line."""
-        error = record.exc_info[1] if record.exc_info else None
-        text = f"{record.getMessage()} ({type(error).__name__}: {error})" if error is not None else record.getMessage()
-        print(f"ibvs-qp live: ignored: {' '.join(text.split())[:_LINE]}", file=sys.stderr)
-
-
-def quiet_server() -> None:
-    """Send errors of websockets and asyncio to one line each."""
-    for name in ("websockets.server", "websockets", "asyncio"):
-        logger = logging.getLogger(name)
-        logger.handlers, logger.propagate = [_OneLine(logging.ERROR)], False
-        logger.setLevel(logging.ERROR)
-
-
-def open_server(host: str, port: int) -> viser.ViserServer:
-    """A server at an address.
-
-    Raises:
-        ConfigError: When the port is taken.
-    """
-    import socket
-
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise ConfigError(f"cannot listen on {host} port {port}: {reason}; give another with --port") from None
-    quiet_server()
-    with contextlib.redirect_stdout(io.StringIO()):  # a table of addresses
-        server = viser.ViserServer(host=host, port=port, verbose=False, label="ibvs-qp live")
-    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-    server.gui.main_panel.dock_right()
-    return server
 
 
 class LiveServer:
@@ -97,13 +52,7 @@ class LiveServer:
         self._sending, self._closed = threading.Lock(), threading.Event()
         self._log: subprocess.Popen[bytes] | None = None
         self._status_s = self._charts_s = 0.0
-
-    @property
-    def address(self) -> str:
-        """Address of the page."""
-        host = self._server.get_host()
-        shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # nosec B104
-        return f"http://{shown}:{self._server.get_port()}"
+        self._last: dict[str, Any] | None = None
 
     def run(self, browser: bool, ready: Callable[[str], None]) -> None:
         """Serve until Ctrl-C, or until the flight's process ends.
@@ -122,13 +71,16 @@ class LiveServer:
             if kind == "failed":
                 raise ConfigError(str(values[0]))
             self._build(*values)
-            ready(self.address)
+            ready(address(self._server))
             if browser:
-                webbrowser.open(self.address)
+                webbrowser.open(address(self._server))
             while True:
                 self._read()
         finally:
             self.close()
+            if (last := self._last) is not None:
+                late = f"{100.0 * last['late']:.2f} % of {last['flown']} ticks later than one tick"
+                print(f"ibvs-qp live: flown to {last['ticks'] * self._tick_s:.2f} s; {late}", flush=True)
 
     def close(self) -> None:
         """End both processes."""
@@ -140,8 +92,7 @@ class LiveServer:
                 self._flight.kill()
             if self._log is not None and self._log.poll() is None:
                 self._log.terminate()
-            with contextlib.redirect_stdout(io.StringIO()):
-                self._server.stop()
+            stop(self._server)
 
     def _receive(self) -> tuple[Any, ...]:
         try:
@@ -187,6 +138,7 @@ class LiveServer:
 
     def _show(self, frame: dict[str, Any]) -> None:
         now, row = time.monotonic(), frame["row"]
+        self._last = frame
         self._scene.show(frame, self._places)
         if row is not None and (now >= self._status_s or frame["events"]):
             self._status_s = now + 1.0 / _STATUS_HZ
