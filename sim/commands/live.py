@@ -43,7 +43,7 @@ class Live:
     log: Annotated[Path | None, optional("FILE")] = None
     """Show a log instead of a flight: a run folder, or an MCAP log of your own loop, of a bag or of paint."""
     out: Annotated[Path | None, optional("DIR")] = None
-    """Folder of what is saved; default: runs/live. With --replay: run folder of the log; default: none."""
+    """Folder of saved files; default: runs/live. With --replay: run folder of the log; default: none."""
     host: str = "127.0.0.1"
     """Address to listen on; another one than loopback lets everyone who reaches it take the controls."""
     port: int = 8080

@@ -1,4 +1,4 @@
-"""What the camera found, small enough for a frame: a compressed picture with its tracks, or the lines alone."""
+"""Findings of the camera, small enough for a frame: a compressed picture with its tracks, or the lines alone."""
 
 from __future__ import annotations
 

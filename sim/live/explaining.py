@@ -1,4 +1,4 @@
-"""Explanation of a tick and its what-if: the recorded program solved again, with other weights and bounds."""
+"""Explanation of a tick: the recorded program solved again, as recorded and with other weights and bounds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _problem(config: ControllerConfig) -> QpProblem:
 
 
 class WhatIf:
-    """Solves recorded ticks of one flight, as flown and with other settings.
+    """Solves recorded ticks of one flight, as recorded and with other settings.
 
     Args:
         config: The controller flown; only its structure matters, weights and bounds are inputs of a tick.
@@ -72,11 +72,11 @@ class WhatIf:
 
 
 def markdown(found: Explanation | None, before: Explanation | None, rotors: tuple[str, ...]) -> str:
-    """Explanation of a tick: thrusts, tasks with their shares of the cost, prices of limits, and what was given up.
+    """Explanation of a tick: thrusts, tasks with their fractions of the cost, prices of limits, unallocated wrench.
 
     Args:
-        found: Of the tick with the values of the what-if.
-        before: As flown.
+        found: With other values.
+        before: As recorded.
         rotors: Names of the rotors.
     """
     if found is None:
@@ -102,7 +102,7 @@ def markdown(found: Explanation | None, before: Explanation | None, rotors: tupl
         lines.append(f"No longer active: {', '.join(gone)}.")
     lost = [f"{value:+.3f} {axis}" for axis, value in zip(_AXES, found.unallocated_wrench, strict=True)
             if abs(value) > _NOTHING]  # fmt: skip
-    lines.append(f"Given up: {', '.join(lost)}." if lost else "Nothing was given up: the whole wrench is allocated.")
+    lines.append(f"Unallocated: {', '.join(lost)}." if lost else "The whole wrench is allocated.")
     return "\n\n".join(lines)
 
 

@@ -33,7 +33,7 @@ _TASK = ("push_n", "speed_m_s")
 _DECADES_FROM, _STEPS = 100.0, 500
 #: Decades of a slider whose range begins at 0, and how near to its left end the value is 0 [-].
 _RANGE, _END = 9, 1.005
-#: Factors of the what-if, in decades, and fastest repetition of a message to one browser [s].
+#: Factors on a value of an explained tick, in decades, and fastest repetition of a message to one browser [s].
 _WHAT_IF_DECADES, _NOTICE_S = 2.0, 1.0
 
 #: Sends a command to the flight.
@@ -105,7 +105,7 @@ class Panel:
         self._server, self._send, self._what_if, self._save = server, send, what_if, save
         self._settings, self._controls = settings, dict[str, Control]()
         self._writer: int | None = None
-        self._told: dict[int, float] = {}
+        self._noticed: dict[int, float] = {}
         self._ticks = self._first = 0
         self.tick_s, self._point = 0.004, None
         gui = server.gui
@@ -141,18 +141,18 @@ class Panel:
             self._writer = min((each for each in self._server.get_clients() if each != client.client_id), default=None)
 
     def _writes(self, event: Any) -> bool:
-        """Whether an event is the writer's; a watcher is told once a second at most."""
+        """Whether an event is the writer's; a watcher gets at most one notice a second."""
         if event.client is None:
             return False
         if event.client_id == self._writer:
             return True
-        self._tell(event.client, "Watching", "Another browser holds the controls; it passes them on when it closes.")
+        self._notify(event.client, "Watching", "Another browser holds the controls; it passes them on when it closes.")
         return False
 
-    def _tell(self, client: viser.ClientHandle, title: str, text: str) -> None:
+    def _notify(self, client: viser.ClientHandle, title: str, text: str) -> None:
         now = time.monotonic()
-        if now - self._told.get(client.client_id, 0.0) > _NOTICE_S:
-            self._told[client.client_id] = now
+        if now - self._noticed.get(client.client_id, 0.0) > _NOTICE_S:
+            self._noticed[client.client_id] = now
             client.add_notification(title, text, auto_close_seconds=5.0)
 
     def _button(self, label: str, act: Callable[[], None], hint: str | None = None) -> Any:
@@ -241,18 +241,20 @@ class Panel:
         )
         names = tuple(name for name in self._settings if name.startswith(("weights.", "limits.")))
         names = tuple(name for name in names if not isinstance(self._settings[name], bool))
-        self._what = gui.add_dropdown("what if", (CEILING, *names), initial_value="weights.push")
+        self._what = gui.add_dropdown("instead", (CEILING, *names), initial_value="weights.push")
         self._factor = gui.add_slider(
             "factor x 1", -_WHAT_IF_DECADES, _WHAT_IF_DECADES, 0.02, 0.0, hint="On its value at that tick, in decades."
         )
-        self._text = gui.add_markdown("Pause, and explain a tick: shares of the cost, prices of limits, what was lost.")
+        self._text = gui.add_markdown(
+            "Pause, and explain a tick: fractions of the cost, prices of limits, lost wrench."
+        )
         for handle in (self._what, self._factor):
             handle.on_update(lambda event: self.explain() if event.client is None or self._writes(event) else None)
 
     # From the flight.
 
     def explain(self, tick: int | None = None, point: np.ndarray | None = None) -> None:
-        """Explain a tick, or the last one with another what-if."""
+        """Explain a tick, or the last one explained with another value."""
         if point is not None:
             self._point, self._tick = point, tick
         if self._point is None:
@@ -291,7 +293,7 @@ class Panel:
         self.note(f"refused: {text}")
         self.show_settings(settings)
         if (client := self._server.get_clients().get(self._writer or 0)) is not None:
-            self._tell(client, "Refused", text)
+            self._notify(client, "Refused", text)
 
     def note(self, text: str) -> None:
         """Show a line under the panel."""

@@ -30,7 +30,7 @@ from sim.storage.atomic import write_text
 FRAME_HZ, PICTURE_HZ = 45.0, 8.0
 #: Rates of simulated over real time [-].
 SLOWEST, FASTEST = 0.1, 10.0
-#: A flight that is behind the clock by more than this gives up the lost time [s].
+#: A flight that is behind the clock by more than this drops the lost time [s].
 BEHIND_S = 0.25
 #: Ticks between rows for the charts [-].
 ROW_TICKS = 10
@@ -55,7 +55,7 @@ class Pace:
         self._begin_s, self._first = time.monotonic(), ticks
 
     def wait_s(self, ticks: int) -> float:
-        """Time until a tick is due, negative where it is late [s]; gives up lost time."""
+        """Time until a tick is due, negative where it is late [s]; drops lost time."""
         due_s = self._begin_s + (ticks - self._first) * self._tick_s / self.rate
         left_s = due_s - time.monotonic()
         if left_s < -BEHIND_S:
@@ -77,7 +77,7 @@ class FlightProcess:
     Args:
         connection: To the server.
         start: Beginning of the session.
-        ghost: Whether the analytic law flies, too.
+        ghost: Whether a second vehicle flies under the analytic law.
     """
 
     def __init__(self, connection: Connection, start: Start, ghost: bool) -> None:
@@ -114,9 +114,8 @@ class FlightProcess:
         if now >= self._next_frame_s and select([], [self._connection], [], 0.0)[1]:
             self._next_frame_s = max(self._next_frame_s + 1.0 / FRAME_HZ, now)
             self._connection.send(("frame", self._frame(now)))
-        if wait_s > 0.0 or session.ticks % 4 == 0:
-            if self._connection.poll(min(max(wait_s, 0.0), max(self._next_frame_s - now, 0.0))):
-                self._obey(*self._connection.recv())
+        if self._connection.poll(min(max(wait_s, 0.0), max(self._next_frame_s - now, 0.0))):
+            self._obey(*self._connection.recv())
 
     def _obey(self, name: str, *values: Any) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The server: viser's page, the process of the flight, and what passes between them."""
+"""The server: viser's page, the process of the flight, and their messages."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class LiveServer:
     Args:
         start: Beginning of the session.
         server: viser's server.
-        out: Folder of what is saved.
-        ghost: Whether the analytic law flies, too.
+        out: Folder of saved files.
+        ghost: Whether a second vehicle flies under the analytic law.
     """
 
     def __init__(self, start: Start, server: viser.ViserServer, out: Path, ghost: bool = True) -> None:

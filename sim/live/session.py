@@ -166,7 +166,7 @@ class Session:
 
     Args:
         start: Beginning.
-        ghost: Whether the analytic law flies, too.
+        ghost: Whether a second vehicle flies under the analytic law.
         kind: Class of the loop of the QP law.
         changes: Changes to come.
     """

@@ -1,4 +1,4 @@
-"""Session file: the beginning of a flight and what changed in it, tick by tick; it repeats the flight."""
+"""Session file: the beginning of a flight and its changes with their ticks; it repeats the flight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's server: its address, its end, and one line about what it ignores."""
+"""The page's server: its address, its end, and one line for an ignored message."""
 
 from __future__ import annotations
 

@@ -251,5 +251,6 @@ def _brush_stamps(radius_px: float) -> list[list[np.ndarray]]:
         for column in offsets:
             distance = np.sqrt((grid[:, None] - row) ** 2 + (grid[None, :] - column) ** 2)
             line.append(np.rint(255.0 * np.clip(radius_px + 0.5 - distance, 0.0, 1.0)).astype(np.uint8))
+            line[-1].flags.writeable = False  # shared by all flights
         stamps.append(line)
     return stamps
