@@ -119,7 +119,7 @@ class LiveServer:
                 self._connection.send(command)
 
     def _read(self) -> None:
-        """Handle what the flight has sent; of several frames only the last one is shown."""
+        """Handle the messages of the flight; of several frames only the last one is shown."""
         shown, rows, events, paint = None, [], [], None
         messages = [self._receive()]
         while self._connection.poll():
