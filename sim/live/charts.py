@@ -12,8 +12,6 @@ from sim.live.rows import KEPT_S, OUTCOMES, STATES
 #: Charts per second [Hz], height of a chart [px], and samples in it [-].
 CHARTS_HZ, _HEIGHT_PX, _SAMPLES = 3.0, 150, 300
 _COLORS = ("#c62828", "#1565c0", "#2e7d32", "#ef6c00", "#6a1b9a", "#00838f", "#5d4037", "#546e7a")
-#: Prices below this count as inactive; the chart is logarithmic [-].
-_LEAST_PRICE = 1e-6
 
 
 class Charts:
@@ -40,7 +38,7 @@ class Charts:
         self.rows, self.before = np.empty((0, width)), np.empty((0, width))
         single = {
             "Push [N]": ("asked", "commanded", "felt", "push", "push before"),
-            "Path error [mm]": ("path_mm", "path_mm before"),
+            "Path error [mm], 0 beside the strokes": ("path_mm", "path_mm before"),
             "Tilt [deg]": ("roll", "pitch", "roll before", "pitch before"),
             "Thrusts [N]": tuple(f"thrusts.{index}" for index in range(len(rotors))),
             "Active limits: price": tuple(f"price.{index}" for index in range(len(limits))),
@@ -57,8 +55,8 @@ class Charts:
             for index, name in enumerate(names):
                 dash = {"dash": (4, 4)} if name.endswith("before") else {}
                 color = _COLORS[index % len(_COLORS)]
-                series.append({"label": words.get(name, name), "stroke": color, "width": 1.5, "spanGaps": False} | dash)
-            scales: dict[str, Any] = {"x": {"time": False, "auto": True}, "y": {"auto": True}}
+                series.append({"label": words.get(name, name), "stroke": color, "width": 1.5} | dash)
+            scales: dict[str, Any] = {"x": {"time": False}}
             chart = gui.add_uplot(
                 (nothing,) * (len(names) + 1), tuple(series), title=title, scales=scales, height=_HEIGHT_PX,
                 legend={"show": len(names) < 7},
@@ -93,15 +91,15 @@ class Charts:
                 chart.data = (times, *(self._column(name, rows, times) for name in names))
 
     def _column(self, name: str, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Values at some times; uPlot takes no gaps, so a missing trace before is the present one."""
         plain, _, before = name.partition(" ")
         plain, _, index = plain.partition(".")
-        source = self.before if before else rows
-        if not len(source):
-            return np.full(len(times), np.nan)
-        found = np.clip(np.searchsorted(source[:, 0], times), 0, len(source) - 1)
-        values = source[found, self._places[plain].start + int(index or 0)]
-        apart = np.abs(source[found, 0] - times) > 0.5
-        return np.where(apart | (values == 0.0 if plain == "price" else False), np.nan, values)
+        column = self._places[plain].start + int(index or 0)
+        values = np.interp(times, rows[:, 0], rows[:, column])
+        if before and len(self.before):
+            there = (self.before[0, 0] <= times) & (times <= self.before[-1, 0])
+            values = np.where(there, np.interp(times, self.before[:, 0], self.before[:, column]), values)
+        return np.nan_to_num(values)
 
 
 def _numbered(names: tuple[str, ...]) -> str:

@@ -32,7 +32,7 @@ def changes_text(config: PilotConfig, task: PaintingConfig) -> str:
     """
     import tomli_w
 
-    base = to_dict(PilotConfig(law=config.law))
+    base = to_dict(PilotConfig(law=config.law), derived=True)
     table = changed_keys(to_dict(config), base)
     for name in ("painting", "vision"):  # follow from the scene
         table.pop(name, None)

@@ -61,7 +61,7 @@ class Page:
 
     def tab(self, label: str) -> None:
         """Open a tab."""
-        self.page.get_by_role("tab", name=label, exact=True).dispatch_event("click")
+        self.page.get_by_role("tab", name=label, exact=True).click(force=True)
 
     def enter(self, label: str, value: float) -> None:
         """Type a number into the box of a slider."""
