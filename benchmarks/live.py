@@ -36,7 +36,7 @@ async def _all(port: int, clients: int, seconds: float) -> list[float]:
 
 def main() -> None:
     """Fly, connect, read, and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Load of ibvs-qp live")
     parser.add_argument("--clients", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--port", type=int, default=8765)

@@ -66,10 +66,10 @@ class Page:
     def enter(self, label: str, value: float) -> None:
         """Type a number into the box of a slider."""
         caption = self.page.get_by_text(label, exact=False).first
-        box = caption.locator("xpath=ancestor::*[.//input][1]//input").last
+        box = caption.locator("xpath=ancestor::*[.//input][1]//input").last.element_handle()
         box.evaluate("(each) => each.focus()")
-        box.fill(str(value), force=True)
-        box.press("Enter")
+        box.fill(str(value), force=True)  # changes the caption, so the box is not looked up again
+        self.page.keyboard.press("Enter")
 
 
 @pytest.fixture
