@@ -33,6 +33,8 @@ FORCE_M_N, THRUST_M_N = 0.02, 0.005
 _PUSH, _FRICTION, _THRUST, _AT_LIMIT = (205, 40, 40), (230, 150, 20), (40, 150, 70), (220, 40, 40)
 _LIMIT, _PATH, _GHOST, _REACH, _CAMERA = (40, 40, 40), (20, 90, 200), (90, 120, 230), (60, 160, 90), (40, 40, 90)
 _BLADES = (90, 90, 100, 255), (60, 60, 70, 255)
+#: The arrows are drawn this far above the tip, beside the brush [m].
+_ABOVE_M = 0.07
 #: A thrust this near to a limit is at it [N].
 _NEAR_N = 0.05
 #: Turn of a rotor per frame and newton of thrust [rad/N]: slow enough for the frames.
@@ -291,7 +293,7 @@ class LiveScene:
 
     def _arrows(self, part: dict[str, np.ndarray]) -> None:
         """Push of the tip on the wall, and friction of the wall on the tip."""
-        tip, friction = FLIP * part["tip"], FLIP * [0.0, *part["friction"]]
+        tip, friction = FLIP * part["tip"] + _ABOVE_M * np.eye(3)[2], FLIP * [0.0, *part["friction"]]
         push = np.array([float(part["push"][0]), 0.0, 0.0])
         ends = [(tip - FORCE_M_N * push, tip), (tip, tip + FORCE_M_N * friction)]
         self._forces.points = np.array(ends, np.float32)
