@@ -33,6 +33,8 @@ FORCE_M_N, THRUST_M_N = 0.02, 0.005
 _PUSH, _FRICTION, _THRUST, _AT_LIMIT = (205, 40, 40), (230, 150, 20), (40, 150, 70), (220, 40, 40)
 _LIMIT, _PATH, _GHOST, _REACH, _CAMERA = (40, 40, 40), (20, 90, 200), (90, 120, 230), (60, 160, 90), (40, 40, 90)
 _BLADES = (90, 90, 100, 255), (60, 60, 70, 255)
+#: A rotor is turned in one of so many frames: every message is packed for every browser [-].
+_EVERY = 3
 #: The arrows are drawn this far above the tip, beside the brush [m].
 _ABOVE_M = 0.07
 #: A thrust this near to a limit is at it [N].
@@ -200,10 +202,12 @@ class LiveScene:
                 cast_shadow=False,
             )  # fmt: skip
             self._rotors.append(hub)
-        self._angles = np.zeros(len(blades))
+        self._angles, self._frames = np.zeros(len(blades)), 0
         nowhere = np.zeros((1, 2, 3))
         self._bars = add.add_line_segments("/vehicle/thrusts", nowhere, _THRUST, thickness=0.014)
-        self._forces = add.add_arrows("/forces", nowhere, _PUSH, shaft_radius=0.008, head_radius=0.02, head_length=0.04)
+        self._bar_colors, both = np.zeros(0, np.uint8), np.zeros((2, 2, 3))
+        forces = np.array([_PUSH, _FRICTION], np.uint8)
+        self._forces = add.add_arrows("/forces", both, forces, shaft_radius=0.008, head_radius=0.02, head_length=0.04)
         self._reach_shape = ReachPolytope(scene, config)
         tip = FLIP * vehicle.tip_position_m
         self._reach = add.add_mesh_simple(
@@ -251,12 +255,14 @@ class LiveScene:
             return
         part = {name: row[place] for name, place in places.items()}
         with self._server.atomic():
+            self._frames += 1
             self._frame.position, self._frame.wxyz = FLIP * part["position"], turned(part["quaternion"])
             self._thrusts(part["thrusts"], part["actual"], *frame["limits"], spins=frame["running"])
             self._arrows(part)
             ghost = frame["ghost"]
-            self._ghost.visible = ghost is not None and self.show_ghost
-            if ghost is not None:
+            if self._ghost.visible != (shown := ghost is not None and self.show_ghost):
+                self._ghost.visible = shown
+            if ghost is not None and shown:
                 self._ghost.position = FLIP * ghost[places["position"]]
                 self._ghost.wxyz = turned(ghost[places["quaternion"]])
             if frame.get("paint") is not None:
@@ -287,18 +293,23 @@ class LiveScene:
                 colors.append([_LIMIT] * 2)
             if spins:
                 self._angles[index] += _SPIN * actual[index] * (1.0 if index % 2 else -1.0)
+                if (index + self._frames) % _EVERY:
+                    continue
                 half = 0.5 * self._angles[index]
                 self._rotors[index].wxyz = _product(self._turns[index], (math.cos(half), 0.0, 0.0, math.sin(half)))
-        self._bars.points, self._bars.colors = np.array(points, np.float32), np.array(colors, np.uint8)
+        self._bars.points, painted = np.array(points, np.float32), np.array(colors, np.uint8)
+        if not np.array_equal(painted, self._bar_colors):
+            self._bar_colors = self._bars.colors = painted
 
     def _arrows(self, part: dict[str, np.ndarray]) -> None:
         """Push of the tip on the wall, and friction of the wall on the tip."""
         tip, friction = FLIP * part["tip"] + _ABOVE_M * np.eye(3)[2], FLIP * [0.0, *part["friction"]]
         push = np.array([float(part["push"][0]), 0.0, 0.0])
         ends = [(tip - FORCE_M_N * push, tip), (tip, tip + FORCE_M_N * friction)]
-        self._forces.points = np.array(ends, np.float32)
-        self._forces.colors = np.array([_PUSH, _FRICTION], np.uint8)
-        self._forces.visible = bool(push[0] > 0.0)
+        if self._forces.visible != (shown := bool(push[0] > 0.0)):
+            self._forces.visible = shown
+        if shown:
+            self._forces.points = np.array(ends, np.float32)
 
 
 def _product(first: Any, second: Any) -> np.ndarray:
