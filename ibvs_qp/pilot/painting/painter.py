@@ -43,6 +43,11 @@ class Painter(Strategy):
     _COMPLETED = "all rows painted, retreated"
     _SLIDES = True  # whether a stroke follows the press
 
+    def adjust(self, push_n: float | None = None, speed_m_s: float | None = None) -> None:
+        """See `Strategy.adjust`."""
+        super().adjust(push_n, speed_m_s)
+        self._tip.config = self.config
+
     def reset(self) -> None:
         """As after construction."""
         super().reset()

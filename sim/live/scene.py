@@ -1,0 +1,320 @@
+"""The three-dimensional picture: vehicle, board and paint, forces and limits, camera, path, and the other law's ghost.
+
+Positions are the simulator's, z up: world NED and body FRD turned half about x (`sim.world.mujoco_frames`).
+"""
+
+# MuJoCo's bindings carry no types.
+# pyright: reportAttributeAccessIssue=false
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+import viser
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from allocation.wrench_facets import WrenchFacets
+from ibvs_qp.frames import GRAVITY, rotation_from_quaternion
+from ibvs_qp.pilot import PilotConfig
+from sim.live.camera_picture import picture_of
+from sim.live.process import PAINT_PX_M
+from sim.world.board import BoardGeometry
+from sim.world.mjcf import build_model
+from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, quaternion_of_axes, rotor_quaternion
+from sim.world.scene import Scene
+from sim.world.true_vehicle import true_vehicle
+
+#: Length of a drawn newton [m]: of arrows and polytope, and of thrust bars.
+FORCE_M_N, THRUST_M_N = 0.02, 0.005
+#: Colours (r, g, b): push, friction, thrusts inside their limits and at one, limits, path, ghost, polytope, camera.
+_PUSH, _FRICTION, _THRUST, _AT_LIMIT = (205, 40, 40), (230, 150, 20), (40, 150, 70), (220, 40, 40)
+_LIMIT, _PATH, _GHOST, _REACH, _CAMERA = (40, 40, 40), (20, 90, 200), (90, 120, 230), (60, 160, 90), (40, 40, 90)
+_BLADES = (90, 90, 100, 255), (60, 60, 70, 255)
+#: A rotor is turned in one of so many frames: every message is packed for every browser [-].
+_EVERY = 3
+#: The arrows are drawn this far above the tip, beside the brush [m].
+_ABOVE_M = 0.07
+#: A thrust this near to a limit is at it [N].
+_NEAR_N = 0.05
+#: Turn of a rotor per frame and newton of thrust [rad/N]: slow enough for the frames.
+_SPIN = 0.06
+#: First view: from behind to the right; direction from the target, and distances that show this radius [m].
+_VIEW, _SEEN_M, _FOV = np.array([-0.5, -0.85, 0.35]), 1.1, math.radians(45.0)
+#: The wall behind the board is drawn so far beyond its outline, and so thick [m]; paths lie before the face [m].
+_WALL_M, _THIN_M, _BEFORE_M = 0.8, 0.02, 0.004
+
+
+def turned(quaternion: np.ndarray) -> np.ndarray:
+    """Attitude (w, x, y, z) of the body, z up, of one of FRD in NED."""
+    return FLIP_QUATERNION * quaternion
+
+
+def draw_board(server: viser.ViserServer, scene: Scene) -> viser.ImageHandle:
+    """Board, wall and path of the strokes; every shape of a board is drawn here.
+
+    Returns:
+        The picture on the board, see `board_picture`.
+    """
+    geometry, board = BoardGeometry(scene), scene.board
+    axes = np.column_stack((FLIP * [0.0, *geometry.along], FLIP * [0.0, *-geometry.up], FLIP * [1.0, 0.0, 0.0]))
+    middle = FLIP * [0.0, *geometry.point(0.5 * board.width_m, 0.5 * board.height_m)]
+    turn = quaternion_of_axes(axes)
+    wall = (board.width_m + 2.0 * _WALL_M, board.height_m + 2.0 * _WALL_M, _THIN_M)
+    behind = middle + (board.gap_m + 0.5 * _THIN_M) * np.eye(3)[0]
+    server.scene.add_box("/wall", np.array(scene.wall.color), wall, wxyz=turn, position=behind)
+    server.scene.add_grid(
+        "/ground", 8.0, 8.0, plane="xy", position=(-3.0, float(middle[1]), 0.0), cell_size=0.5, shadow_opacity=0.2
+    )
+    ends, lines = geometry.stroke_ends, []
+    for stroke in range(1, geometry.strokes + 1):
+        spots = geometry.from_pattern(np.array([(u, geometry.stroke_place(stroke)) for u in ends]))
+        lines.append([FLIP * [-_BEFORE_M, *geometry.point(*spot)] for spot in spots])
+    server.scene.add_line_segments("/path", np.array(lines), _PATH, thickness=0.006)
+    picture = board_picture(scene, None)
+    return server.scene.add_image(
+        "/board", picture, board.width_m, board.height_m, wxyz=turn, position=middle, format="jpeg", jpeg_quality=80
+    )
+
+
+def board_picture(scene: Scene, painted: np.ndarray | None) -> np.ndarray:
+    """The board's face, uint8 (h, w, 3), with its paint.
+
+    Args:
+        scene: Colours and size.
+        painted: Fraction of the paint in 255ths, uint8 (h, w); None for a fresh board.
+    """
+    size = round(scene.board.height_m * PAINT_PX_M), round(scene.board.width_m * PAINT_PX_M)
+    part = np.zeros((*size, 1)) if painted is None else painted[..., None] / 255.0
+    colors = np.array(scene.board.color, float), np.array(scene.paint.color, float)
+    return ((1.0 - part) * colors[0] + part * colors[1]).astype(np.uint8)
+
+
+def vehicle_meshes(scene: Scene, config: PilotConfig) -> tuple[trimesh.Trimesh, list[trimesh.Trimesh]]:
+    """Vehicle without its propellers, and one propeller in its rotor's axes per rotor: of the simulator's own model."""
+    vehicle = true_vehicle(scene, config.controller.vehicle, 0)
+    model, ids = build_model(scene, vehicle)
+    bodies = {ids.vehicle}
+    for body in range(model.nbody):
+        if model.body_parentid[body] in bodies:
+            bodies.add(body)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    origin, axes = data.xpos[ids.vehicle], data.xmat[ids.vehicle].reshape(3, 3)
+    parts = []
+    for geom in range(model.ngeom):
+        color, size = model.geom_rgba[geom], model.geom_size[geom]
+        if model.geom_bodyid[geom] not in bodies or color[3] < 0.9:
+            continue
+        kind, pose = mujoco.mjtGeom(int(model.geom_type[geom])), np.eye(4)
+        pose[:3, :3] = axes.T @ data.geom_xmat[geom].reshape(3, 3)
+        pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - origin)
+        if kind == mujoco.mjtGeom.mjGEOM_BOX:
+            part = trimesh.creation.box(2.0 * size)
+        elif kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE):
+            part = trimesh.creation.cylinder(size[0], 2.0 * size[1], sections=20)
+        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            part = trimesh.creation.icosphere(2, size[0])
+        else:
+            continue
+        part.apply_transform(pose)
+        part.visual = trimesh.visual.ColorVisuals(part, np.round(255.0 * color).astype(np.uint8))
+        parts.append(part)
+    blades = []
+    for index in range(vehicle.geometry.count):
+        radius = vehicle.propeller_radius_m
+        blade = trimesh.creation.box((2.0 * radius, 0.09 * radius, 0.004))
+        blade.visual = trimesh.visual.ColorVisuals(blade, _BLADES[index % 2])
+        blades.append(blade)
+    whole = trimesh.util.concatenate(parts)
+    assert isinstance(whole, trimesh.Trimesh)
+    return whole, blades
+
+
+class ReachPolytope:
+    """Forces that the tip can hold against the wall without a moment, in the body's axes.
+
+    Args:
+        scene: The vehicle flown.
+        config: Its nominal values.
+    """
+
+    def __init__(self, scene: Scene, config: PilotConfig) -> None:
+        self._vehicle = true_vehicle(scene, config.controller.vehicle, 0)
+        self._facets = WrenchFacets(self._vehicle.geometry)
+        tip = np.array(self._vehicle.tip_position_m)
+        arm = np.array([[0.0, -tip[2], tip[1]], [tip[2], 0.0, -tip[0]], [-tip[1], tip[0], 0.0]])
+        self._wrench = np.vstack((np.eye(3), arm))
+
+    def mesh(
+        self, quaternion: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Vertices [N], FRD, (v, 3), and faces (f, 3); None where not even hover is attainable."""
+        vehicle = self._vehicle
+        down = rotation_from_quaternion(quaternion).T @ [0.0, 0.0, 1.0]
+        weight = np.concatenate((-vehicle.mass_kg * GRAVITY * down, np.zeros(3)))
+        low, high = self._facets.rooms(weight, lower, upper)
+        if low.max() >= 0.0 or high.min() <= 0.0:
+            return None
+        slopes = self._facets.normals @ self._wrench
+        planes = np.vstack((np.column_stack((slopes, -high)), np.column_stack((-slopes, low))))
+        try:
+            points = HalfspaceIntersection(planes, np.zeros(3)).intersections
+            hull = ConvexHull(points)
+        except QhullError:
+            return None
+        return points.astype(np.float32), hull.simplices.astype(np.uint32)
+
+
+class LiveScene:
+    """Nodes of the scene, moved frame by frame.
+
+    Args:
+        server: viser's server.
+        scene: The truth.
+        config: Configuration of the vehicle.
+    """
+
+    def __init__(self, server: viser.ViserServer, scene: Scene, config: PilotConfig) -> None:
+        self._server, self._scene, self._config = server, scene, config
+        server.scene.set_up_direction("+z")
+        server.scene.configure_default_lights(cast_shadow=False)
+        self._board = draw_board(server, scene)
+        self.vehicle = vehicle = true_vehicle(scene, config.controller.vehicle, 0)
+        body, blades = vehicle_meshes(scene, config)
+        add = server.scene
+        self._frame = add.add_frame("/vehicle", show_axes=False)
+        add.add_mesh_trimesh("/vehicle/body", body)
+        geometry, self._rotors = vehicle.geometry, []
+        self._hubs = [FLIP * place for place in geometry.positions]
+        self._ups = [FLIP * axis for axis in geometry.axes]
+        self._turns = [rotor_quaternion(axis) for axis in geometry.axes]
+        for index, blade in enumerate(blades):
+            hub = add.add_frame(
+                f"/vehicle/rotor_{index}", show_axes=False, wxyz=self._turns[index], position=self._hubs[index]
+            )
+            add.add_mesh_trimesh(f"/vehicle/rotor_{index}/blade", blade)
+            disc = trimesh.creation.cylinder(vehicle.propeller_radius_m, 0.002, sections=32)
+            add.add_mesh_simple(
+                f"/vehicle/rotor_{index}/disc", disc.vertices, disc.faces, color=(120, 140, 160), opacity=0.25,
+                cast_shadow=False,
+            )  # fmt: skip
+            self._rotors.append(hub)
+        self._angles, self._frames = np.zeros(len(blades)), 0
+        nowhere = np.zeros((1, 2, 3))
+        self._bars = add.add_line_segments("/vehicle/thrusts", nowhere, _THRUST, thickness=0.014)
+        self._bar_colors, both = np.zeros(0, np.uint8), np.zeros((2, 2, 3))
+        forces = np.array([_PUSH, _FRICTION], np.uint8)
+        self._forces = add.add_arrows("/forces", both, forces, shaft_radius=0.008, head_radius=0.02, head_length=0.04)
+        self._reach_shape = ReachPolytope(scene, config)
+        tip = FLIP * vehicle.tip_position_m
+        self._reach = add.add_mesh_simple(
+            "/vehicle/reach", np.zeros((3, 3)), np.zeros((1, 3), int), color=_REACH, opacity=0.18, side="double",
+            position=tip, scale=FORCE_M_N, cast_shadow=False, receive_shadow=False, visible=False,
+        )  # fmt: skip
+        camera = scene.camera
+        looks = quaternion_of_axes(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+        self._frustum = add.add_camera_frustum(
+            "/vehicle/camera", math.radians(camera.vertical_fov_deg), camera.width / camera.height, scale=0.12,
+            thickness=0.004, color=_CAMERA, wxyz=looks, position=FLIP * vehicle.camera_position_m,
+        )  # fmt: skip
+        self._ghost = add.add_frame("/ghost", show_axes=False, visible=False)
+        add.add_mesh_simple(
+            "/ghost/body", body.vertices, body.faces, color=_GHOST, opacity=0.3, cast_shadow=False, side="double"
+        )
+        self.show_ghost, self.show_reach = True, False
+        self._reach_due = 0
+        self._view()
+
+    def _view(self) -> None:
+        """The first view: vehicle and board from the side, at any size of the window."""
+        tip = BoardGeometry(self._scene).start_tip
+        target = FLIP * (-0.45, tip[1], tip[2]) + (0.0, 0.0, 0.1)
+        self._target = target
+        camera = self._server.initial_camera
+        camera.fov, camera.look_at, camera.up = _FOV, target, (0.0, 0.0, 1.0)
+        camera.position = target + _VIEW * (_SEEN_M / math.sin(0.5 * _FOV))
+
+        @self._server.on_client_connect
+        def _(client: viser.ClientHandle) -> None:
+            self.fit(client)
+
+    def fit(self, client: viser.ClientHandle) -> None:
+        """Move a narrow window's camera back until the width of the scene fits."""
+        aspect = max(client.camera.aspect, 0.2)
+        half = min(0.5 * _FOV, math.atan(math.tan(0.5 * _FOV) * aspect))
+        client.camera.position = self._target + _VIEW * (_SEEN_M / math.sin(half))
+        client.camera.look_at = self._target
+
+    def show(self, frame: dict[str, Any], places: dict[str, slice]) -> None:
+        """Move everything to a frame of the flight."""
+        row = frame["row"]
+        if row is None:
+            return
+        part = {name: row[place] for name, place in places.items()}
+        with self._server.atomic():
+            self._frames += 1
+            self._frame.position, self._frame.wxyz = FLIP * part["position"], turned(part["quaternion"])
+            self._thrusts(part["thrusts"], part["actual"], *frame["limits"], spins=frame["running"])
+            self._arrows(part)
+            ghost = frame["ghost"]
+            if self._ghost.visible != (shown := ghost is not None and self.show_ghost):
+                self._ghost.visible = shown
+            if ghost is not None and shown:
+                self._ghost.position = FLIP * ghost[places["position"]]
+                self._ghost.wxyz = turned(ghost[places["quaternion"]])
+            if frame.get("paint") is not None:
+                self._board.image = board_picture(self._scene, frame["paint"])
+            if frame.get("picture") is not None:
+                self._frustum.image = picture_of(frame["picture"])
+                self._polytope(part["quaternion"], *frame["limits"])
+
+    def _polytope(self, quaternion: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+        found = self._reach_shape.mesh(quaternion, lower, upper) if self.show_reach else None
+        self._reach.visible = found is not None
+        if found is not None:
+            self._reach.vertices, self._reach.faces = (FLIP * found[0]).astype(np.float32), found[1]
+
+    def _thrusts(
+        self, thrusts: np.ndarray, actual: np.ndarray, lower: np.ndarray, upper: np.ndarray, *, spins: bool
+    ) -> None:
+        """Bars of the commanded thrusts on the rotors, with ticks at their limits; the rotors turn."""
+        points, colors = [], []
+        for index, (hub, up) in enumerate(zip(self._hubs, self._ups, strict=True)):
+            side = 0.04 * np.cross(up, [1.0, 0.0, 0.0])
+            at_limit = min(thrusts[index] - lower[index], upper[index] - thrusts[index]) < _NEAR_N
+            points.append((hub, hub + THRUST_M_N * thrusts[index] * up))
+            colors.append([_AT_LIMIT if at_limit else _THRUST] * 2)
+            for bound in (lower[index], upper[index]):
+                place = hub + THRUST_M_N * bound * up
+                points.append((place - side, place + side))
+                colors.append([_LIMIT] * 2)
+            if spins:
+                self._angles[index] += _SPIN * actual[index] * (1.0 if index % 2 else -1.0)
+                if (index + self._frames) % _EVERY:
+                    continue
+                half = 0.5 * self._angles[index]
+                self._rotors[index].wxyz = _product(self._turns[index], (math.cos(half), 0.0, 0.0, math.sin(half)))
+        self._bars.points, painted = np.array(points, np.float32), np.array(colors, np.uint8)
+        if not np.array_equal(painted, self._bar_colors):
+            self._bar_colors = self._bars.colors = painted
+
+    def _arrows(self, part: dict[str, np.ndarray]) -> None:
+        """Push of the tip on the wall, and friction of the wall on the tip."""
+        tip, friction = FLIP * part["tip"] + _ABOVE_M * np.eye(3)[2], FLIP * [0.0, *part["friction"]]
+        push = np.array([float(part["push"][0]), 0.0, 0.0])
+        ends = [(tip - FORCE_M_N * push, tip), (tip, tip + FORCE_M_N * friction)]
+        if self._forces.visible != (shown := bool(push[0] > 0.0)):
+            self._forces.visible = shown
+        if shown:
+            self._forces.points = np.array(ends, np.float32)
+
+
+def _product(first: Any, second: Any) -> np.ndarray:
+    (a, b, c, d), (e, f, g, h) = first, second
+    return np.array(
+        (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+         a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)
+    )  # fmt: skip
