@@ -27,7 +27,7 @@ from sim.live.session_file import Start
 from sim.storage.atomic import write_text
 
 #: Frames per second of the clock [Hz]; of coverage and pictures among them [Hz].
-FRAME_HZ, PICTURE_HZ = 45.0, 8.0
+FRAME_HZ, PICTURE_HZ = 36.0, 6.0
 #: Rates of simulated over real time [-].
 SLOWEST, FASTEST = 0.1, 10.0
 #: A flight that is behind the clock by more than this drops the lost time [s].
