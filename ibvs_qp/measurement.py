@@ -253,9 +253,9 @@ class FeatureFrame:
         velocity: Linear velocity of the centre of mass in B at capture [m/s], (3,), or None.
         velocity_covariance: Its covariance, (3, 3); unobserved directions have a large variance.
         velocity_stamp_ns: Time for which the velocity holds; 0 means at capture (flow: half a frame earlier).
-        curvature: Normal curvatures of the wall (right right, right down, down down) [1/m], (3,), > 0 where it bulges
-            towards the camera, or None for a flat one. Plane and lines are then those of the tangent plane at the tip,
-            onto which the wall is unrolled.
+        curvature: Normal curvatures of the wall (right right, right down, down down) [1/m], (3,), right being level,
+            > 0 where it bulges towards the camera, or None for a flat one. Plane and lines are then those of the tangent
+            plane at the tip, onto which the wall is unrolled.
     """
 
     lines: tuple[LineFeature, ...]

@@ -64,6 +64,8 @@ INPUTS = {
     "paint": 1,
     "ends": 4,
 }
+#: Part of the way to the centre of a hollow wall up to which the tip's distance counts, and least curvature [1/m].
+TOWARDS_CENTRE, FLATTEST = 0.75, 1e-6
 #: Inputs of a picture without velocity, and without line.
 _NO_VELOCITY, _NO_LINE = (0.0,) * 14, (0.0,) * 13
 #: End points of a line without them.
@@ -73,12 +75,16 @@ _NO_ENDS = (0.0,) * 4
 def unrolled(curvature: ca.SX, distance: ca.SX) -> ca.SX:
     r"""Way along a curved wall per way of a tip before it, (2, 2): :math:`(I + d K)^{-1}`.
 
-    A tip at a distance d before a bulge moves on a larger circle than the place before it.
+    A tip at a distance d before a bulge moves on a larger circle than the place before it. Before a hollow wall the
+    matrix is singular at the centre of its curvature; d counts up to `TOWARDS_CENTRE` of the way there.
 
     Args:
         curvature: Entries (right right, right down, down down) of K [1/m], (3,).
         distance: d [m].
     """
+    first, both, second = ca.vertsplit(curvature)
+    least = 0.5 * (first + second) - ca.sqrt(0.25 * (first - second) ** 2 + both * both)
+    distance = ca.fmin(distance, TOWARDS_CENTRE / ca.fmax(-least, FLATTEST))
     first, both, second = ca.vertsplit(distance * curvature)
     first, second = 1.0 + first, 1.0 + second
     determinant = first * second - both * both

@@ -271,7 +271,10 @@ class Model:
 
     @property
     def turning_lever(self) -> ca.SX:
-        """Mass times the tip's acceleration along n per angular acceleration [kg m], (3,): zero before a level wall."""
+        """Mass times the tip's acceleration along n per angular acceleration [kg m], (3,).
+
+        It is zero for a level vehicle that faces a level wall with its tip at the height of the centre of mass.
+        """
         vehicle = self.config.vehicle
         return vehicle.mass_kg * ca.cross(ca.DM(vehicle.tip_position_m), self.normal)
 

@@ -23,6 +23,10 @@ from ibvs_qp.supervision.supervision import Limits, Supervision
 FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 
 
+#: Least and largest velocity of the centre of mass over that of the tip along a curved wall [-].
+FASTER = 0.25, 3.0
+
+
 class Planning:
     """Runs the strategy; the supervisor ends its job.
 
@@ -111,8 +115,10 @@ class Planning:
         """
         distance = contact.distance if contact.known else ASSUMED_DISTANCE
         reference = image_reference(command, self._tip_ahead + distance, self._tip_below, self._tip_right)
-        if not any(curvature):
+        if self.painter.descending or not any(curvature):
             return reference
-        right, both, down = ((self._tip_forward + distance) * entry for entry in curvature)
-        moves = np.array(((1.0 + right, both), (both, 1.0 + down)))
+        right, both, down = curvature
+        curvatures, directions = np.linalg.eigh(np.array(((right, both), (both, down))))
+        scales = np.clip(1.0 + (self._tip_forward + distance) * curvatures, *FASTER)
+        moves = (directions * scales) @ directions.T
         return dataclasses.replace(reference, velocity=moves @ reference.velocity, travel=moves @ reference.travel)

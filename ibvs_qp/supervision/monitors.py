@@ -65,6 +65,8 @@ MARGIN = 0.5
 #: A single rotor that gives at least this fraction of its thrust is weak, by its blades or its drive: its scale is
 #: changed. One that gives less is stuck or lost; so is one that its scale does not explain after so many changes.
 LEAST_SCALE, MOST_CHANGES = 0.5, 2
+#: Least thrust in a ratio [N].
+LEAST_THRUST = 0.5
 #: Time after a change of the scale in which motors and filters settle [s]; changes this far apart count as new.
 SETTLING_S, FORGOTTEN_S = 0.25, 2.0
 
@@ -447,7 +449,7 @@ class RotorMonitor:
         return ", ".join(words)
 
     def _suspect(self, missing: np.ndarray, thrusts: np.ndarray, time_s: float) -> None:
-        if self._changes and time_s - self._changes[-1][0] < SETTLING_S and self._gives_enough(missing, thrusts):
+        if self._changes and time_s - self._changes[-1][0] < SETTLING_S and self._settles(missing, thrusts):
             self._suspects.clear()
             return
         # While one rotor is followed, its remaining deficit must not be ascribed to a pair.
@@ -462,9 +464,11 @@ class RotorMonitor:
             if self._found or len(rotors) > 1 or not self._rescale(rotor, loss, float(thrusts[rotor]), time_s):
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 
-    def _gives_enough(self, missing: np.ndarray, thrusts: np.ndarray) -> bool:
-        """Whether the rotor whose scale was changed last has not stopped."""
+    def _settles(self, missing: np.ndarray, thrusts: np.ndarray) -> bool:
+        """Whether the rotor whose scale was changed last explains the missing thrust, and has not stopped."""
         rotor = self._changes[-1][1]
+        if int(np.argmax(np.abs(missing))) != rotor:
+            return False
         given = float(thrusts[rotor] - missing[rotor] / self._signatures[rotor, rotor])
         return given > LEAST_SCALE * float(thrusts[rotor])
 
@@ -474,14 +478,17 @@ class RotorMonitor:
         ``loss`` is its missing thrust and ``thrust`` that of the motors' model, with the scale of before [N].
         """
         self._changes = [change for change in self._changes if time_s - change[0] < FORGOTTEN_S]
-        ratio = (thrust - loss) / max(thrust, LEAST_SCALE)
+        ratio = (thrust - loss) / max(thrust, LEAST_THRUST)
         scale = min(float(self.scale[rotor]) * ratio, 1.0)
         again = sum(other == rotor for _, other in self._changes) >= MOST_CHANGES
-        if again or scale < LEAST_SCALE or scale == self.scale[rotor]:
-            self.scale[rotor] = 1.0
+        weak = not again and scale >= LEAST_SCALE and scale != self.scale[rotor]
+        if not weak and self.scale[rotor] == 1.0:
             return False
         self.scale = self.scale.copy()
-        self.scale[rotor] = scale
+        self.scale[rotor] = scale if weak else 1.0
+        if not weak:
+            self.note = f"{self._names[rotor]}: no scale explains its thrust"
+            return False
         self._changes.append((time_s, rotor))
         self._suspects.clear()
         self.note = f"{self._names[rotor]} gives {100.0 * scale:.0f} % of its thrust"

@@ -183,10 +183,11 @@ class Supervision:
         """The command for weak rotors: more than the thrust that they are to give, within limits and thrust rate."""
         thrusts, last = command.thrusts, self._thrusts
         if self.rotor_note and self.settings.supervise and last is not None:
-            most = self._most_change
-            thrusts = np.clip(np.clip(thrusts / self._rotors.scale, *self._box), last - most, last + most)
+            if self.state is not SafetyState.TERMINATED:
+                thrusts = np.clip(thrusts / self._rotors.scale, *self._box)
+            thrusts = np.clip(thrusts, last - self._most_change, last + self._most_change)
             command = dataclasses.replace(command, thrusts=thrusts)
-        self._thrusts = thrusts
+        self._thrusts = thrusts.copy()  # those of the command are the caller's
         return command
 
     def reference(self, requested: Reference) -> Reference:

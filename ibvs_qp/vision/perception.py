@@ -187,7 +187,9 @@ class Perception:
         clock.lap("flow")
 
         tracks = self._tracker.tracks
-        features = make_features(frame.stamp_ns, tracks, plane, flow, self._config.track.confidence_min, self._curvature.unrolled_by)
+        features = make_features(
+            frame.stamp_ns, tracks, plane, flow, self._config.track.confidence_min, self._curvature.unrolled_by
+        )
         kept = tuple(map(copy.copy, tracks))
         return PerceptionResult(
             features=features,
@@ -212,7 +214,7 @@ class Perception:
 
     def _unrolled(self, frame: RgbdFrame, predicted: np.ndarray | None) -> RgbdFrame:
         """The picture before the tangent plane at the tip, where the wall is curved."""
-        curvature = self._curvature.seen()
+        curvature = self._curvature.seen() if predicted is not None else self._curvature.flat()
         if curvature is None or predicted is None:
             return frame
         return unrolled(frame, predicted, curvature, self._tip)

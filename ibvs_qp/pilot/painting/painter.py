@@ -45,7 +45,10 @@ class Painter(Strategy):
 
     def adjust(self, push_n: float | None = None, speed_m_s: float | None = None) -> None:
         """See `Strategy.adjust`."""
+        before = self.config.speed_m_s
         super().adjust(push_n, speed_m_s)
+        if self.phase in ("paint", "retouch"):
+            self._way_s *= before / self.config.speed_m_s
         self._tip.config = self.config
 
     def reset(self) -> None:

@@ -67,7 +67,7 @@ class Strategy(ABC):
         return ""
 
     def adjust(self, push_n: float | None = None, speed_m_s: float | None = None) -> None:
-        """Change push [N] and painting speed [m/s] from the next tick on; None leaves one as it is.
+        """Change push [N] and painting speed [m/s] from the next tick on, also after `reset`; None leaves one as it is.
 
         Raises:
             ConfigError: When a value is out of range; nothing is changed then.

@@ -7,6 +7,7 @@ import math
 import cv2
 import numpy as np
 
+from ibvs_qp.measurement import LARGEST_CURVATURE
 from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.picture.unrolled import principal, wall_axes
 from ibvs_qp.vision.surface.plane import PlaneEstimate
@@ -49,12 +50,16 @@ class WallCurvature:
         sigma = math.sqrt(float(self.covariance[[0, 2], [0, 2]].max()))
         self._curved = size > max(FLAT if self._curved else CURVED, CERTAIN * sigma)
         if not self._curved:
-            self.unrolled_by = None
-            return None
+            return self.flat()
         kappa, angle = principal(self.value)
+        kappa = min(max(kappa, -LARGEST_CURVATURE), LARGEST_CURVATURE)
         c, s = math.cos(angle), math.sin(angle)
         self.unrolled_by = kappa * np.array((c * c, c * s, s * s))
         return self.unrolled_by
+
+    def flat(self) -> None:
+        """The next picture is not unrolled."""
+        self.unrolled_by = None
 
     def update(self, grid: CoarseGrid, inverse: np.ndarray, plane: PlaneEstimate, interval_s: float) -> None:
         """Take in a picture.

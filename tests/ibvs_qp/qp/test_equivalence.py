@@ -59,7 +59,8 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
         turn = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
         rows.append((at_tip, wanted, weights.line * line.weight))
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
-    along = np.concatenate((vehicle.mass_kg * setpoints.normal, np.zeros(3)))
+    turning = share * np.cross(vehicle.tip_position_m, setpoints.normal)  # in contact the tip accelerates
+    along = vehicle.mass_kg * np.concatenate((setpoints.normal, turning))
     rows.append((along, setpoints.push_command, weights.push * share))
     standoff = setpoints.standoff_command + kept_along * (along @ before - setpoints.standoff_command)
     rows.append((along, standoff, weights.push * (1.0 - share)))

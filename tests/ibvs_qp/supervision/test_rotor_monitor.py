@@ -80,6 +80,14 @@ def test_a_rotor_that_stops_after_its_scale_was_changed_is_found_at_once() -> No
     assert "gives" in weak(watch, 0.1, 0.08, begin_s=0.1)
 
 
+def test_another_rotor_that_stops_while_a_scale_settles_is_found_at_once() -> None:
+    watch = monitor()
+    assert weak(watch, 0.7, 0.1) == "" and watch.scale[2] < 1.0
+    missing = np.array([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
+    texts = [watch.update(missing, 0.1, HOVER, 0.1 + 0.004 * number) for number in range(20)]
+    assert VEHICLE.geometry.names[3] in texts[-1]
+
+
 def test_two_rotors_at_once_are_told_apart() -> None:
     missing = np.zeros(6)
     missing[[1, 4]] = 6.0, 5.0

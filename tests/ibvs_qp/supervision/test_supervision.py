@@ -138,6 +138,25 @@ def test_a_weak_rotor_gets_more_command_within_limits_and_rate() -> None:
     assert limits is not None and limits[1][2] == pytest.approx(0.7 * 52.56) and limits[1][0] == 52.56
 
 
+def test_a_terminated_vehicle_with_a_weak_rotor_gets_the_floor() -> None:
+    supervision = watched(60, StubResponse(missing_thrust=np.where(np.arange(6) == 2, 3.4, 0.0)))
+    assert supervision.rotor_note
+    watched(100, after=supervision, down=(0.95, 0.0, 0.31))
+    assert supervision.state is SafetyState.TERMINATED
+    for _ in range(10):
+        command = supervision.explained(dataclasses.replace(COMMAND, thrusts=FLOOR.copy()))
+    np.testing.assert_array_equal(command.thrusts, FLOOR)
+
+
+def test_thrusts_of_a_command_are_the_callers() -> None:
+    supervision = watched(30, StubResponse(missing_thrust=np.where(np.arange(6) == 2, 3.4, 0.0)))
+    first = supervision.explained(COMMAND)
+    before = first.thrusts.copy()
+    first.thrusts[:] = 0.0
+    second = supervision.explained(COMMAND)
+    assert np.abs(second.thrusts - before).max() <= 2.0 + 1e-9
+
+
 def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
     supervision, off = Supervision(CONFIG, SETTINGS), Supervision(CONFIG, SafetySettings(supervise=False))
     for each in (supervision, off):

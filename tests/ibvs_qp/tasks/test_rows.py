@@ -141,7 +141,9 @@ def test_every_other_task_row_by_hand(plain: HybridController, share: float) -> 
         thrusts, setpoints = rng.uniform(2.0, 30.0, 6), controller.setpoints
         right, down = weights.velocity * setpoints.free[0], weights.velocity * setpoints.free[1]
         motion = accelerations(controller, thrusts)
-        force = motion[:3] * controller.config.vehicle.mass_kg
+        vehicle = controller.config.vehicle
+        turned = motion[:3] + share * np.cross(motion[3:], vehicle.tip_position_m)  # in contact the tip's
+        force = turned * vehicle.mass_kg
         found = rows(controller, thrusts)
         expected = {
             "push": (setpoints.normal @ force, setpoints.push_command, weights.push * share),
