@@ -254,8 +254,8 @@ class FeatureFrame:
         velocity_covariance: Its covariance, (3, 3); unobserved directions have a large variance.
         velocity_stamp_ns: Time for which the velocity holds; 0 means at capture (flow: half a frame earlier).
         curvature: Normal curvatures of the wall (right right, right down, down down) [1/m], (3,), right being level,
-            > 0 where it bulges towards the camera, or None for a flat one. Plane and lines are then those of the tangent
-            plane at the tip, onto which the wall is unrolled.
+            > 0 where it bulges towards the camera, or None for a flat one. Plane and lines are then those of the
+            tangent plane at the tip, onto which the wall is unrolled.
     """
 
     lines: tuple[LineFeature, ...]
