@@ -8,9 +8,11 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from plants import at_rest
 
 from sim.world.board import BoardGeometry
 from sim.world.bristles import Bristles
+from sim.world.contact import contact_stiffness
 from sim.world.errors import AirErrors, ArmErrors, BrushErrors, WorldErrors, world_errors
 from sim.world.plant import Plant
 from sim.world.relief import Relief
@@ -130,3 +132,17 @@ def test_a_flexible_arm_hangs_straight_at_rest() -> None:
 def test_bristles_are_off_without_sizes() -> None:
     brush = Bristles(BrushErrors(), 1500.0, 0.3)
     assert brush.stiffness(0.002, 1.0) == 1500.0 and brush.friction(0.0) == 0.3 and brush.drag(0.0) == 0.0
+
+
+def test_bristles_before_the_wall_beside_the_board_touch_nothing() -> None:
+    scene = Scene(errors=dataclasses.replace(WorldErrors(), brush=FIELD.brush))
+    for depth, touches in ((0.020, False), (0.052, True)):  # the wall's face lies 50 mm behind the board's
+        plant = Plant(scene)
+        place = np.array((depth, -0.02, -1.5)) - plant.vehicle.tip_position_m
+        for _ in range(3):
+            at_rest(plant, place)
+            plant.data.qvel[1] = 0.1  # along the wall
+            plant.step(plant.thrusts_actual)
+        stiffness, tool = contact_stiffness(plant.model), plant.data.xfrc_applied[plant._ids.tool]
+        assert (np.abs(tool).max() > 0.5) == touches
+        assert touches == (stiffness > 1500.0 * 1.1) and stiffness < 1500.0 * 1.7
