@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -55,10 +56,10 @@ def test_a_brush_sticks_harder_than_it_slides_and_paint_dries() -> None:
     assert brush.drag(FIELD.brush.drying_s) == pytest.approx(FIELD.brush.drag_n_s_m / math.e)
 
 
-def factors(distance_m: float, height_m: float, air: AirErrors) -> np.ndarray:
+def factors(distance_m: float, height_m: float, air: AirErrors, seed: int = 1) -> np.ndarray:
     """Thrust factors of a level vehicle with the body origin so far from wall and ground."""
     vehicle = Plant(Scene()).vehicle
-    near = WallAir(air, BOARD, vehicle, TICK_S, 1)
+    near = WallAir(air, BOARD, vehicle, TICK_S, seed)
     return near.factors(np.array((-distance_m, 0.3, BOARD.ground - height_m)), np.eye(3))
 
 
@@ -69,13 +70,19 @@ def test_front_rotors_change_most_at_the_wall_and_none_far_away() -> None:
     front, rear = np.abs(changes[ahead == ahead.max()]), np.abs(changes[ahead == ahead.min()])
     assert 0.0 < front.max() <= 0.08 and rear.max() < 0.2 * front.min()
     np.testing.assert_allclose(factors(10.0, 50.0, air), 1.0, atol=1e-9)
-    low = factors(10.0, 0.3 * vehicle.propeller_radius_m, AirErrors(ground_thrust=0.08)) - 1.0
-    assert np.ptp(low) < 0.01 and 0.0 < np.abs(low).max() <= 0.08
+
+
+def test_the_ground_adds_thrust_alone() -> None:
+    """Up to 7 % at one radius, as Cheeseman and Bennett state."""
+    radius, air = Plant(Scene()).vehicle.propeller_radius_m, AirErrors(ground_thrust=FIELD.air.ground_thrust)
+    gains = np.array([factors(10.0, radius, air, seed) - 1.0 for seed in range(100)])
+    assert (gains > 0.0).all() and np.ptp(gains, axis=1).max() < 0.01
+    assert 0.06 < gains.max() < 0.08
 
 
 def test_a_front_raises_the_wind_in_its_time_and_passes() -> None:
     air = AirErrors(front_m_s=3.0, front_rise_s=0.5, front_every_s=1.0)
-    wind = Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 2)
+    wind = Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 3)
     means = []
     for _ in range(5000):
         wind.force((0.0, 0.0, 0.0))
@@ -84,6 +91,31 @@ def test_a_front_raises_the_wind_in_its_time_and_passes() -> None:
     assert max(means) == pytest.approx(3.0) and min(means) == 0.0
     assert steps.max() == pytest.approx(3.0 / 0.5, rel=0.05)
     assert np.count_nonzero(np.array(means) == max(means)) * TICK_S > 0.5 * FRONT_S
+
+
+def test_a_step_of_the_wind_outlasts_fronts_and_the_drawn_wind_comes_back() -> None:
+    air = AirErrors(wind_m_s=5.0, front_m_s=3.0, front_every_s=1.0)
+    wind = Wind(WindScene(mean_m_s=(1.0, 0.0, 0.0)), air, np.eye(3), 0.9, TICK_S, 2)
+    drawn, step = wind.mean.tolist(), (0.0, 8.0, 0.0)
+
+    def distances(mean: Sequence[float]) -> tuple[float, float]:
+        """Least and largest distance of the wind from a mean in 20 s."""
+        away = []
+        for _ in range(5000):
+            wind.force((0.0, 0.0, 0.0))
+            away.append(math.dist(wind.mean, mean))
+        return min(away), max(away)
+
+    wind.step_to(step, 0.0)
+    assert distances(step) == pytest.approx((0.0, 3.0))
+    wind.back(0.0)
+    assert distances(drawn) == pytest.approx((0.0, 3.0))
+
+
+def test_fronts_change_no_other_wind_of_a_seed() -> None:
+    calm, fronts = AirErrors(wind_m_s=5.0, gust_n=(0.5, 1.5)), AirErrors(wind_m_s=5.0, gust_n=(0.5, 1.5), front_m_s=3.0)
+    first = [Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 4).force((0.0, 0.0, 0.0)) for air in (calm, fronts)]
+    assert first[0] == first[1]
 
 
 def test_wind_is_drawn_up_to_its_size_and_grows_with_height() -> None:
