@@ -23,10 +23,10 @@ PAINTED = 0.5
 #: Meaning of every array of a trace (N control ticks, M physics steps, F pictures).
 FIELDS = {
     "t": "(N,) time since start [s]",
-    "position": "(N,3) true centre of mass, world (NED before an upright wall), x into the wall [m]",
+    "position": "(N,3) body origin (assumed centre of mass), world (NED before an upright wall), x into the wall [m]",
     "velocity": "(N,3) true velocity of the centre of mass in B [m/s]",
     "attitude": "(N,4) true quaternion (w,x,y,z) of B in the world",
-    "euler": "(N,3) true roll, pitch, yaw against gravity [rad]; yaw 0 faces the wall",
+    "euler": "(N,3) true roll, pitch, yaw against gravity [rad]; yaw 0 faces the wall in the middle of the board",
     "tip": "(N,3) true tip position in the wall's chart; x = 0 is the board's face [m]",
     "thrusts": "(N,n) commanded thrusts [N]",
     "thrusts_actual": "(N,n) thrusts after motor lag [N]",

@@ -33,6 +33,15 @@ class Bristles:
     def __init__(self, errors: BrushErrors, stiffness: float, friction: float) -> None:
         self._errors, self._stiffness, self._friction = errors, stiffness, friction
 
+    def set_wall(self, stiffness: float, friction: float) -> None:
+        """Another stiffness of the first touch [N/m] and sliding coefficient."""
+        self._stiffness, self._friction = stiffness, friction
+
+    def depth(self, force: float) -> float:
+        """Penetration of a brush at rest [m] under a force [N]: :math:`K x (1 + p x) = F`."""
+        spring, growth = force / self._stiffness, self._errors.progression_per_mm / _MM
+        return 2.0 * spring / (1.0 + math.sqrt(1.0 + 4.0 * growth * spring))
+
     def stiffness(self, depth: float, rate: float) -> float:
         """Stiffness [N/m].
 

@@ -141,7 +141,7 @@ class AirErrors(Checked):
     front_rise_s: float = setting(0.5, "time of that change", unit="s", low=0.0, high=60.0)
     front_every_s: float = setting(15.0, "mean time between fronts", unit="s", low=1.0, high=1e4)
     wall_thrust: float = _size("relative change of a rotor's thrust at 0.3 radii from the wall, up to this", "", 0.5)
-    ground_thrust: float = _size("the same above the ground", "", 0.5)
+    ground_thrust: float = _size("relative gain of a rotor's thrust at 0.3 radii above the ground, up to this", "", 0.5)
     recirculation: float = _size("relative thrust noise at 0.3 radii from the wall, standard deviation", "", 0.5)
 
 

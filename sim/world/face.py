@@ -40,6 +40,11 @@ class Face:
         self.on_board = True
         self._board, self._place, self._quaternion, self._left_at = board, place, quaternion, 0.0
 
+    @property
+    def depth(self) -> float:
+        """Depth of the surface before the tip in the chart [m]: of the board's face, or of the wall's."""
+        return 0.0 if self.on_board else self._board.scene.board.gap_m
+
     def follow(self, tip: Sequence[float]) -> str | None:
         """Move the plane to the surface before the tip.
 
@@ -72,7 +77,7 @@ class Face:
         """
         board = self._board
         surface, foot = board.surface, np.array(place)
-        foot[0] = (0.0 if self.on_board else board.scene.board.gap_m) - height
+        foot[0] = self.depth - height
         self._place[:] = FLIP * surface.points(foot)
         along, up = slopes
         rise = along * board.along + up * board.up  # in (y, z) of the chart

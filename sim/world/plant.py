@@ -48,7 +48,7 @@ class Plant(PlantReadings):
         landed: Whether it is over because the vehicle touched down.
         wind: The air; its mean may be changed in flight.
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
-        outer_force: Force at the true centre of mass in addition to that of the air, world NED [N], or None.
+        outer_force: Force at the true centre of mass in addition to that of the air, NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
         pushes: Normal contact force at every physics step of the last tick [N], likewise.
         tick_ns: The control tick [ns].
@@ -164,7 +164,7 @@ class Plant(PlantReadings):
         self._commanded[:] = commanded
         self._air[:] = self.wind.force(self._centre_velocity.tolist(), -self.truth.item(_FALL.start))
         if self.outer_force is not None:
-            self._air += self.outer_force
+            self._air += self._board.from_ned @ self.outer_force
         self._drive()
         self._lag[:] = self._lags
         struck = self._face.follow(self.truth[_TIP].tolist())
@@ -196,9 +196,27 @@ class Plant(PlantReadings):
         return self.landed or self.crashed is not None
 
     def displace(self, offset: np.ndarray) -> None:
-        """Move the vehicle at once by an offset in the world, NED [m], (3,): as if everything else had moved back."""
+        """Move the vehicle at once by an offset in the world [m], (3,): as if everything else had moved back."""
         self.data.qpos[:3] += FLIP * offset
+        self._touch.jumped()
         self._sense()
+
+    def set_wall(self, stiffness: float, friction: float) -> float:
+        """Another wall before the tip.
+
+        Args:
+            stiffness: Of the contact, that of the first touch of bristles [N/m].
+            friction: Coulomb coefficient, the sliding one of bristles.
+
+        Returns:
+            How much deeper the tip lies in the new wall under the same push at rest [m].
+        """
+        return self._touch.set_wall(stiffness, friction, self.tip)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit vector into the wall at the tip, world, (3,)."""
+        return self._board.surface.axes(self.tip)[:, 0]
 
     @property
     def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:

@@ -30,6 +30,7 @@ class PlantReadings:
     vehicle: TrueVehicle
     clearance: PropellerClearance
     _act: np.ndarray
+    _board: BoardGeometry
 
     position = _reading("position", "Body origin (assumed centre of mass), world NED [m], (3,).")
     quaternion = _reading("quaternion", "Attitude (w, x, y, z) of B in I, (4,).")
@@ -61,8 +62,8 @@ class PlantReadings:
 
     @property
     def euler(self) -> np.ndarray:
-        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall, + to the right."""
-        ned = BoardGeometry(self.scene).from_ned.T @ self.rotation
+        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall in the middle of the board, + to the right."""
+        ned = self._board.from_ned.T @ self.rotation
         (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = ned.tolist()
         pitch = math.asin(max(-1.0, min(1.0, -forward_z)))
         return np.array([math.atan2(right_z, down_z), pitch, math.atan2(forward_y, forward_x)])

@@ -6,17 +6,19 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
 from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
-from sim.world.surfaces import KINDS
+from sim.world.surfaces import KINDS, SIDES
 
 Color = tuple[int, int, int]
 #: Steepest wall: angle of its normal to the horizon [deg].
 STEEPEST_DEG = 15.0
+#: End of a board around a vertical axis: a quarter of the circumference from its middle [deg]; a chart ends at a half.
+WIDEST_DEG = 90.0
 #: Nominal rates and delays of the sensors.
 _SENSORS = channels(SensorFrame)
 _IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
@@ -52,8 +54,8 @@ class SurfaceScene(Checked):
         high=STEEPEST_DEG,
     )
     radius_m: float = setting(3.0, "radius", unit="m", low=1.5, high=1000.0)
-    axis: str = choice("upright", "direction of the axis of a cylinder", ("upright", "level"))
-    hollow: bool = setting(False, "the wall bends towards the vehicle, as inside a tank")
+    axis: str = choice("vertical", "direction of the axis of a cylinder", ("vertical", "horizontal"))
+    side: str = choice("convex", "side of a cylinder that is painted: outside, or inside as in a tank", SIDES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,17 +184,21 @@ class Scene(Checked):
     errors: WorldErrors = field(default_factory=WorldErrors)
 
     def __post_init__(self) -> None:
-        """The board ends where its normal is `STEEPEST_DEG` off level."""
+        """A board around a cylinder ends where its normal is `STEEPEST_DEG` off level, or `WIDEST_DEG` aside."""
         super().__post_init__()
-        surface = self.surface
-        if surface.kind != "cylinder" or surface.axis != "level":
+        surface, board = self.surface, self.board
+        if surface.kind != "cylinder":
             return
-        most = 2.0 * surface.radius_m * math.radians(STEEPEST_DEG - abs(surface.lean_deg))
-        if self.board.height_m > most:
-            raise ConfigError(
-                f"board.height_m = {self.board.height_m:g} m is refused: allowed is at most {most:.3g} m, where the "
-                f"normal of a wall of surface.radius_m = {surface.radius_m:g} m is {STEEPEST_DEG:g} deg off level"
-            )
+        if surface.axis == "horizontal":
+            name, size, end, way = "board.height_m", board.height_m, STEEPEST_DEG - abs(surface.lean_deg), "off level"
+            angle = STEEPEST_DEG
+        else:
+            name, size, end, way = "board.width_m", board.width_m, WIDEST_DEG, "aside"
+            angle = WIDEST_DEG
+        most = 2.0 * surface.radius_m * math.radians(end)
+        if size > most:
+            reason = f"where the normal of a wall of surface.radius_m = {surface.radius_m:g} m is {angle:g} deg {way}"
+            raise out_of_range(name, size, "m", f"allowed is at most {most:.3g} m, {reason}")
 
 
 def load_scene(file: str | Path) -> Scene:

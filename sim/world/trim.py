@@ -34,8 +34,21 @@ def start_pose(scene: Scene, vehicle: VehicleParams, seed: int) -> tuple[np.ndar
     """Start position of the body origin [m] (3,) and quaternion of B in the world (4,); level, tip facing the wall."""
     distance, right, down, turn = stream(seed, "start").uniform(-1.0, 1.0, 4)
     offset = np.array([-distance * START_DISTANCE_M, right * START_RIGHT_M, down * START_DOWN_M])
-    board = BoardGeometry(scene)
-    yaw = math.radians(scene.start.yaw_deg + turn * START_YAW_DEG) + board.bearing(board.start_tip)
+    return facing(BoardGeometry(scene), vehicle, offset, turn * START_YAW_DEG)
+
+
+def facing(
+    board: BoardGeometry, vehicle: VehicleParams, offset: np.ndarray, turn_deg: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position of the body origin [m] (3,) and quaternion of B in the world (4,) of a level vehicle before the wall.
+
+    Args:
+        board: Wall and board with the start of the scene.
+        vehicle: Its tip is placed.
+        offset: Of the tip from the scene's start, in the chart [m], (3,).
+        turn_deg: Yaw from that of the scene's start [deg].
+    """
+    yaw = math.radians(board.scene.start.yaw_deg + turn_deg) + board.bearing(board.start_tip)
     x, y, z = vehicle.tip_position_m
     arm = board.from_ned @ (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z)
     level = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)

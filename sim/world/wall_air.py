@@ -4,9 +4,10 @@ The relative change of a rotor's thrust at a clearance c of its tip circle from 
 
 .. math:: s\, e^{-(c / R - 0.3)}, \quad c \ge 0.3 R,
 
-R being the rotor's radius and s the change at 0.3 R. Front rotors change more than rear ones: that is the pitching
-moment. Recirculation is a noise of every rotor with the same law of the wall's clearance. (The law and its length R are
-assumed, after measurements near ceilings and walls that fall below a percent at two radii.)
+R being the rotor's radius and s the change at 0.3 R: of either sign near the wall, a gain above the ground. Front
+rotors change more than rear ones: that is the pitching moment. Recirculation is a noise of every rotor with the same
+law of the wall's clearance. (The law and its length R are assumed, after measurements near ceilings and walls that fall
+below a percent at two radii.)
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class WallAir:
     def __init__(self, errors: AirErrors, board: BoardGeometry, vehicle: TrueVehicle, tick_s: float, seed: int) -> None:
         generator = stream(seed, "errors.air.rotors")
         sizes = errors.wall_thrust, errors.ground_thrust
-        self._wall, self._ground = (generator.uniform(-1.0, 1.0, 2) * sizes).tolist()
+        self._wall, self._ground = (generator.uniform((-1.0, 0.0), 1.0) * sizes).tolist()
         self._board, self._radius = board, vehicle.propeller_radius_m
         self._hubs = vehicle.geometry.positions
         normals, count = Normals(generator), vehicle.geometry.count

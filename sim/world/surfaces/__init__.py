@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from sim.world.surfaces.surface import KINDS, Surface
+from sim.world.surfaces.surface import KINDS, SIDES, Surface
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
-__all__ = ["KINDS", "Surface"]
+__all__ = ["KINDS", "SIDES", "Surface"]

@@ -6,21 +6,21 @@ import math
 
 import numpy as np
 
-from sim.world.surfaces.surface import Shape, Surface
+from sim.world.surfaces.surface import CONCAVE, Shape, Surface
 
 
 class Cylinder(Surface, kind="cylinder"):
-    r"""A cylinder about an upright or level axis that touches the plane x = 0 in the middle of the board.
+    r"""A cylinder about a vertical or horizontal axis that touches the plane x = 0 in the middle of the board.
 
     With s the way around it from there, R the radius and :math:`\sigma = 1` where it bulges towards the vehicle (-1
-    where it is hollow), a place at depth d has, in the plane across the axis,
+    where it is concave), a place at depth d has, in the plane across the axis,
 
     .. math:: x = \sigma (R - \rho \cos(s / R)), \quad y = \rho \sin(s / R), \quad \rho = R - \sigma d
     """
 
     def __init__(self, middle: np.ndarray, settings: Shape) -> None:
-        self._radius, self._sign = settings.radius_m, -1.0 if settings.hollow else 1.0
-        self._around = 1 if settings.axis == "upright" else 2  # index of the coordinate that goes around the axis
+        self._radius, self._sign = settings.radius_m, -1.0 if settings.side == CONCAVE else 1.0
+        self._around = 1 if settings.axis == "vertical" else 2  # index of the coordinate that goes around the axis
         self._middle = float(middle[self._around - 1])
 
     def chart(self, points: np.ndarray) -> np.ndarray:

@@ -17,6 +17,8 @@ from ibvs_qp.quaternion import conjugate, multiply
 
 #: Steps of Newton's method along rays, and the step of its slope [m]: exact to 1e-9 m at a radius of 1.5 m.
 HIT_STEPS, STEP_M = 5, 1e-5
+#: Sides of a curved wall: it bends away from the vehicle, or towards it.
+SIDES = CONVEX, CONCAVE = "convex", "concave"
 #: Kinds of surfaces by name.
 KINDS: dict[str, type[Surface]] = {}
 
@@ -31,12 +33,12 @@ class Shape(Protocol):
 
     @property
     def axis(self) -> str:
-        """Direction of the axis: upright or level."""
+        """Direction of the axis: vertical or horizontal."""
         ...
 
     @property
-    def hollow(self) -> bool:
-        """Whether it bends towards the vehicle."""
+    def side(self) -> str:
+        """Side towards the vehicle, one of `SIDES`."""
         ...
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 import pytest
+from plants import at_rest
 
 from sim.world.board import BoardGeometry
 from sim.world.bristles import Bristles
+from sim.world.contact import contact_stiffness
 from sim.world.errors import AirErrors, ArmErrors, BrushErrors, WorldErrors, world_errors
 from sim.world.plant import Plant
 from sim.world.relief import Relief
@@ -53,10 +56,10 @@ def test_a_brush_sticks_harder_than_it_slides_and_paint_dries() -> None:
     assert brush.drag(FIELD.brush.drying_s) == pytest.approx(FIELD.brush.drag_n_s_m / math.e)
 
 
-def factors(distance_m: float, height_m: float, air: AirErrors) -> np.ndarray:
+def factors(distance_m: float, height_m: float, air: AirErrors, seed: int = 1) -> np.ndarray:
     """Thrust factors of a level vehicle with the body origin so far from wall and ground."""
     vehicle = Plant(Scene()).vehicle
-    near = WallAir(air, BOARD, vehicle, TICK_S, 1)
+    near = WallAir(air, BOARD, vehicle, TICK_S, seed)
     return near.factors(np.array((-distance_m, 0.3, BOARD.ground - height_m)), np.eye(3))
 
 
@@ -67,13 +70,19 @@ def test_front_rotors_change_most_at_the_wall_and_none_far_away() -> None:
     front, rear = np.abs(changes[ahead == ahead.max()]), np.abs(changes[ahead == ahead.min()])
     assert 0.0 < front.max() <= 0.08 and rear.max() < 0.2 * front.min()
     np.testing.assert_allclose(factors(10.0, 50.0, air), 1.0, atol=1e-9)
-    low = factors(10.0, 0.3 * vehicle.propeller_radius_m, AirErrors(ground_thrust=0.08)) - 1.0
-    assert np.ptp(low) < 0.01 and 0.0 < np.abs(low).max() <= 0.08
+
+
+def test_the_ground_adds_thrust_alone() -> None:
+    """Up to 7 % at one radius, as Cheeseman and Bennett state."""
+    radius, air = Plant(Scene()).vehicle.propeller_radius_m, AirErrors(ground_thrust=FIELD.air.ground_thrust)
+    gains = np.array([factors(10.0, radius, air, seed) - 1.0 for seed in range(100)])
+    assert (gains > 0.0).all() and np.ptp(gains, axis=1).max() < 0.01
+    assert 0.06 < gains.max() < 0.08
 
 
 def test_a_front_raises_the_wind_in_its_time_and_passes() -> None:
     air = AirErrors(front_m_s=3.0, front_rise_s=0.5, front_every_s=1.0)
-    wind = Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 2)
+    wind = Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 3)
     means = []
     for _ in range(5000):
         wind.force((0.0, 0.0, 0.0))
@@ -82,6 +91,31 @@ def test_a_front_raises_the_wind_in_its_time_and_passes() -> None:
     assert max(means) == pytest.approx(3.0) and min(means) == 0.0
     assert steps.max() == pytest.approx(3.0 / 0.5, rel=0.05)
     assert np.count_nonzero(np.array(means) == max(means)) * TICK_S > 0.5 * FRONT_S
+
+
+def test_a_step_of_the_wind_outlasts_fronts_and_the_drawn_wind_comes_back() -> None:
+    air = AirErrors(wind_m_s=5.0, front_m_s=3.0, front_every_s=1.0)
+    wind = Wind(WindScene(mean_m_s=(1.0, 0.0, 0.0)), air, np.eye(3), 0.9, TICK_S, 2)
+    drawn, step = wind.mean.tolist(), (0.0, 8.0, 0.0)
+
+    def distances(mean: Sequence[float]) -> tuple[float, float]:
+        """Least and largest distance of the wind from a mean in 20 s."""
+        away = []
+        for _ in range(5000):
+            wind.force((0.0, 0.0, 0.0))
+            away.append(math.dist(wind.mean, mean))
+        return min(away), max(away)
+
+    wind.step_to(step, 0.0)
+    assert distances(step) == pytest.approx((0.0, 3.0))
+    wind.back(0.0)
+    assert distances(drawn) == pytest.approx((0.0, 3.0))
+
+
+def test_fronts_change_no_other_wind_of_a_seed() -> None:
+    calm, fronts = AirErrors(wind_m_s=5.0, gust_n=(0.5, 1.5)), AirErrors(wind_m_s=5.0, gust_n=(0.5, 1.5), front_m_s=3.0)
+    first = [Wind(WindScene(), air, np.eye(3), 0.9, TICK_S, 4).force((0.0, 0.0, 0.0)) for air in (calm, fronts)]
+    assert first[0] == first[1]
 
 
 def test_wind_is_drawn_up_to_its_size_and_grows_with_height() -> None:
@@ -130,3 +164,17 @@ def test_a_flexible_arm_hangs_straight_at_rest() -> None:
 def test_bristles_are_off_without_sizes() -> None:
     brush = Bristles(BrushErrors(), 1500.0, 0.3)
     assert brush.stiffness(0.002, 1.0) == 1500.0 and brush.friction(0.0) == 0.3 and brush.drag(0.0) == 0.0
+
+
+def test_bristles_before_the_wall_beside_the_board_touch_nothing() -> None:
+    scene = Scene(errors=dataclasses.replace(WorldErrors(), brush=FIELD.brush))
+    for depth, touches in ((0.020, False), (0.052, True)):  # the wall's face lies 50 mm behind the board's
+        plant = Plant(scene)
+        place = np.array((depth, -0.02, -1.5)) - plant.vehicle.tip_position_m
+        for _ in range(3):
+            at_rest(plant, place)
+            plant.data.qvel[1] = 0.1  # along the wall
+            plant.step(plant.thrusts_actual)
+        stiffness, tool = contact_stiffness(plant.model), plant.data.xfrc_applied[plant._ids.tool]
+        assert (np.abs(tool).max() > 0.5) == touches
+        assert touches == (stiffness > 1500.0 * 1.1) and stiffness < 1500.0 * 1.7

@@ -15,16 +15,16 @@ from sim.sensors.suite import SensorSuite
 from sim.world.board import BoardGeometry
 from sim.world.plant import Plant
 from sim.world.scene import BoardScene, ImuScene, Scene, StartScene, SurfaceScene
-from sim.world.surfaces import Surface
+from sim.world.surfaces import SIDES, Surface
 from sim.world.trim import hover_thrusts
 
 SMALLEST_M = 1.5
 CURVED = [
-    SurfaceScene(kind="cylinder", radius_m=SMALLEST_M, axis=axis, hollow=hollow)
-    for axis in ("upright", "level")
-    for hollow in (False, True)
+    SurfaceScene(kind="cylinder", radius_m=SMALLEST_M, axis=axis, side=side)
+    for axis in ("vertical", "horizontal")
+    for side in SIDES
 ]
-NAMES = [f"{each.axis}, {'hollow' if each.hollow else 'bulge'}" for each in CURVED]
+NAMES = [f"{each.axis}, {each.side}" for each in CURVED]
 every_curve = pytest.mark.parametrize("settings", CURVED, ids=NAMES)
 UNITS = np.eye(3)
 
@@ -127,9 +127,16 @@ def test_a_leaning_wall_turns_gravity_and_nothing_else() -> None:
 
 
 def test_a_board_steeper_than_15_degrees_is_refused() -> None:
-    settings = SurfaceScene(kind="cylinder", axis="level", radius_m=SMALLEST_M)
+    settings = SurfaceScene(kind="cylinder", axis="horizontal", radius_m=SMALLEST_M)
     Scene(surface=settings, board=BoardScene(height_m=0.78))
     with pytest.raises(ConfigError, match=r"board.height_m = 0\.8 .* 15 deg"):
         Scene(surface=settings, board=BoardScene(height_m=0.8))
     with pytest.raises(ConfigError, match=r"board.height_m = 0\.6"):
         Scene(surface=dataclasses.replace(settings, lean_deg=8.0))
+
+
+def test_a_board_around_more_than_a_half_of_a_cylinder_is_refused() -> None:
+    settings = SurfaceScene(kind="cylinder", radius_m=SMALLEST_M)
+    Scene(surface=settings, board=BoardScene(width_m=4.7))
+    with pytest.raises(ConfigError, match=r"board.width_m = 4\.8 m is refused: allowed is at most 4\.71 m"):
+        Scene(surface=settings, board=BoardScene(width_m=4.8))
