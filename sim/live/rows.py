@@ -28,7 +28,7 @@ _STATE, _OUTCOME = ({each: index for index, each in enumerate(kind)} for kind in
 _PHASE = {phase: index for index, phase in enumerate(PHASES)}
 #: Numbers of a row: times in s and us, pushes in N, path error in mm, angles in deg.
 NUMBERS = "t wall_s asked commanded felt push path_mm roll pitch step_us state phase outcome reach".split()
-#: Readings of the plant in a row, and their widths.
+#: Readings of the plant in a row, and their widths: the last entries of each; of friction, those along the wall.
 READ = {"position": 3, "quaternion": 4, "tip": 3, "friction": 2}
 
 
@@ -50,7 +50,7 @@ class LiveRecorder(Recorder):
         widths = {**dict.fromkeys(NUMBERS, 1), **READ, "thrusts": rotors, "actual": rotors, "price": len(self.limits)}
         ends = np.cumsum([0, *widths.values()]).tolist()
         self.places = {name: slice(*ends[index : index + 2]) for index, name in enumerate(widths)}
-        self._read = np.concatenate([np.arange(PLACES[name].start, PLACES[name].stop) for name in READ])
+        self._read = np.concatenate([np.arange(PLACES[name].stop - width, PLACES[name].stop) for name, width in READ.items()])
         self.capacity = ticks_in(KEPT_S + 1.0, pilot.config.controller.tick_s)
         self._rows = np.full((self.capacity, ends[-1]), math.nan)
         points = pilot.setpoints.step.point.size if self.limits else 0
