@@ -46,7 +46,7 @@ class LoggedFlight:
         scene: The truth, or the default one for a log without it.
         limits: Names of the limits.
         seed: Of the errors of the vehicle.
-        note: What is not shown; empty for a whole log.
+        note: The limit at which the log is cut; empty for a whole one.
 
     Args:
         file: A run folder, or an MCAP log.
