@@ -54,11 +54,14 @@ def main() -> None:
     ]
     flight = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert flight.stdout is not None
-    print(flight.stdout.readline().strip())
-    rates = asyncio.run(_all(given.port, given.clients, given.seconds))
-    print(f"frames/s of {len(rates)} clients: {min(rates):.1f} to {max(rates):.1f}")
-    flight.send_signal(signal.SIGTERM)
-    print(flight.communicate(timeout=30)[0].strip())
+    try:
+        print(flight.stdout.readline().strip())
+        rates = asyncio.run(_all(given.port, given.clients, given.seconds))
+        print(f"frames/s of {len(rates)} clients: {min(rates):.1f} to {max(rates):.1f}")
+        flight.send_signal(signal.SIGTERM)
+        print(flight.communicate(timeout=30)[0].strip())
+    finally:
+        flight.kill()
 
 
 if __name__ == "__main__":

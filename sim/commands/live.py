@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ibvs_qp.config.errors import ConfigError
+from sim.commands.exit_codes import EXIT_INTERNAL
 from sim.commands.options import SceneWorld, check_mujoco, check_seed, flag, optional, preset_file, scene_file
 
 #: Ports for a server without privileges [-].
@@ -22,7 +24,7 @@ class Live:
 
     Example: ibvs-qp live --scene dark_board --seed 3
 
-    Example: ibvs-qp live --replay runs/live/2026-11-30T10-00-00/session.json
+    Example: ibvs-qp live --replay runs/live/2026-11-30T10-00-00-1/session.json
     """
 
     scene: Annotated[Path | None, optional("FILE")] = None
@@ -50,6 +52,8 @@ class Live:
     """Port to listen on."""
     no_open: Annotated[bool, flag] = False
     """Print the address, and do not open a browser."""
+    json: Annotated[bool, flag] = False
+    """With --replay: print the result as JSON."""
 
     def run(self, words: list[str]) -> int:
         """Serve until Ctrl-C; or fly a session again."""
@@ -59,21 +63,32 @@ class Live:
         check_seed(self.seed)
         if not _PORTS[0] <= self.port <= _PORTS[1]:
             raise ConfigError(f"--port {self.port} is refused: allowed is {_PORTS[0]} to {_PORTS[1]}")
+        if self.json:
+            raise ConfigError("--json is of --replay")
         start = self._start()
         try:
             import viser  # noqa: F401
         except ModuleNotFoundError:
             raise ConfigError("live needs the extra live: pip install -c constraints.txt -e '.[live]'") from None
-        from sim.live.server import LiveServer
+        from sim.live.scene import check_drawn
+        from sim.live.server import FlightEnded, LiveServer
         from sim.live.site import open_server
 
-        server = open_server(self.host, self.port)
         if self.log is not None:
-            from sim.live.log_scene import LogServer
+            from sim.live.log_scene import LoggedFlight, LogServer
 
-            LogServer(self.log, server).run(not self.no_open, _announce)
-        else:
+            flight = LoggedFlight(self.log)
+            if flight.note:
+                print(f"ibvs-qp live: {flight.note}", file=sys.stderr)
+            LogServer(flight, open_server(self.host, self.port)).run(not self.no_open, _announce)
+            return 0
+        check_drawn(start.scene)
+        server = open_server(self.host, self.port)
+        try:
             LiveServer(start, server, self.out or Path("runs/live"), not self.no_ghost).run(not self.no_open, _announce)
+        except FlightEnded as error:
+            print(f"ibvs-qp: {error}", file=sys.stderr)
+            return EXIT_INTERNAL
         return 0
 
     def _start(self) -> Start:
@@ -106,9 +121,10 @@ class Live:
         from sim.live.rows import LiveLoop
         from sim.live.session import repeat
         from sim.live.session_file import SessionFile
+        from sim.report.rundir import as_json
 
         assert self.replay is not None
-        file, notes = SessionFile.read(self.replay), Console(stderr=True)
+        file, notes = SessionFile.read(self.replay), Console(stderr=True, quiet=self.json)
         with working(notes, f"Flying {file.ticks} ticks again ..."):
             session = repeat(file, LiveLoop if self.out is None else ClosedLoop)
         again = session.file()
@@ -120,7 +136,10 @@ class Live:
         same = (again.ticks, again.digest) == (file.ticks, file.digest)
         if not same:
             raise ConfigError(f"{self.replay}: the flight is another one after {again.ticks} of {file.ticks} ticks")
-        print(f"{file.ticks} ticks and {len(file.changes)} changes: bit-identical")
+        if self.json:
+            print(as_json({"schema": 1, "ticks": file.ticks, "changes": len(file.changes), "identical": True}))
+        else:
+            print(f"{file.ticks} ticks and {len(file.changes)} changes: bit-identical")
         return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,7 @@ from ibvs_qp.qp.explain import Explanation, TickReplay
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.symbolic.signals import places
 from sim.evaluate.explanation_text import TASK_HEADINGS, task_rows
+from sim.evaluate.table import markdown as table
 
 #: Upper thrust limit of all rotors, an input of the program.
 CEILING = "thrust_ceiling"
@@ -38,7 +40,7 @@ class WhatIf:
 
     def __init__(self, config: ControllerConfig) -> None:
         self._problem = _problem(equations(config))
-        self._replay = TickReplay(self._problem)
+        self._replay, self._replaying = TickReplay(self._problem), threading.Lock()  # it has one buffer
         self._places = places(self._problem.model.signals.inputs)
         self.rotors = self._problem.model.config.vehicle.geometry.names
 
@@ -68,7 +70,8 @@ class WhatIf:
             if not np.isfinite(value):
                 raise out_of_range(name, value, "", "a finite number is needed")
             changed[self._places[name]] = value
-        return self._replay.explain(changed)
+        with self._replaying:
+            return self._replay.explain(changed)
 
 
 def markdown(found: Explanation | None, before: Explanation | None, rotors: tuple[str, ...]) -> str:
@@ -85,8 +88,8 @@ def markdown(found: Explanation | None, before: Explanation | None, rotors: tupl
     changes = [f"{value - was:+.2f}" for value, was in zip(found.thrusts, flown.thrusts, strict=True)]
     thrusts = [(name, f"{was:.2f}", f"{value:.2f}", change) for name, was, value, change in
                zip(rotors, flown.thrusts, found.thrusts, changes, strict=True)]  # fmt: skip
-    lines = [_table(("rotor", "flown N", "now N", "change N"), thrusts)]
-    lines.append(_table(TASK_HEADINGS, task_rows(found)))
+    lines = [table(("rotor", "flown N", "now N", "change N"), thrusts)]
+    lines.append(table(TASK_HEADINGS, task_rows(found)))
     prices = {limit.name: limit.price for limit in flown.active_limits}
     limits = [
         (limit.name, limit.side, f"{row.value:.3g}", f"{prices.get(limit.name, 0.0):.3g}", f"{limit.price:.3g}",
@@ -96,7 +99,7 @@ def markdown(found: Explanation | None, before: Explanation | None, rotors: tupl
         )
     ]  # fmt: skip
     headings = ("limit", "side", "value", "price flown", "price now", "holds for changes of", "until", "slack's share")
-    lines.append(_table(headings, limits) if limits else "No limit is active.")
+    lines.append(table(headings, limits) if limits else "No limit is active.")
     gone = [name for name in prices if name not in {limit.name for limit in found.active_limits}]
     if gone:
         lines.append(f"No longer active: {', '.join(gone)}.")
@@ -104,8 +107,3 @@ def markdown(found: Explanation | None, before: Explanation | None, rotors: tupl
             if abs(value) > _NOTHING]  # fmt: skip
     lines.append(f"Unallocated: {', '.join(lost)}." if lost else "The whole wrench is allocated.")
     return "\n\n".join(lines)
-
-
-def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [headings, ("---",) * len(headings), *rows]
-    return "\n".join("| " + " | ".join(each) + " |" for each in lines)

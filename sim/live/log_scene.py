@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,12 +26,12 @@ from sim.flight.trace import Trace
 from sim.live.charts import Charts
 from sim.live.explaining import WhatIf, markdown
 from sim.live.rows import NUMBERS, READ
-from sim.live.scene import LiveScene
-from sim.live.site import address, stop
+from sim.live.scene import LiveScene, check_drawn
+from sim.live.site import address, guarded, open_browser, stop
 from sim.world.scene import Scene
 
-#: Rows in the charts, at most [-]; ticks of an MCAP log that are read, at most [-]: an hour.
-_MOST_ROWS, _MOST_TICKS = 3000, 900_000
+#: Rows in the charts, at most [-]; rows and inputs of an MCAP log that are kept, at most [bytes].
+_MOST_ROWS, _MOST_BYTES = 3000, 1e9
 _STATES = tuple(str(state) for state in SafetyState)
 
 
@@ -46,6 +45,8 @@ class LoggedFlight:
         config: Configuration flown.
         scene: The truth, or the default one for a log without it.
         limits: Names of the limits.
+        seed: Of the errors of the vehicle.
+        note: The limit at which the log is cut; empty for a whole one.
 
     Args:
         file: A run folder, or an MCAP log.
@@ -55,7 +56,7 @@ class LoggedFlight:
     """
 
     def __init__(self, file: Path) -> None:
-        self.scene, self.limits = Scene(), tuple[str, ...]()
+        self.scene, self.limits, self.seed, self.note = Scene(), tuple[str, ...](), 0, ""
         if file.is_dir() and not (file / "log.mcap").exists():
             self._of_run(load_run(file).get("qp"), file)
         else:
@@ -65,9 +66,7 @@ class LoggedFlight:
         widths = {**dict.fromkeys(NUMBERS, 1), **READ, "thrusts": rotors, "actual": rotors, "price": len(self.limits)}
         ends = np.cumsum([0, *widths.values()]).tolist()
         self.places = {name: slice(*ends[index : index + 2]) for index, name in enumerate(widths)}
-        self.rows = np.full((ticks, ends[-1]), np.nan)
-        self.rows[:, self.places["quaternion"]] = (1.0, 0.0, 0.0, 0.0)
-        self.rows[:, self.places["state"]] = 0.0
+        self.rows = np.zeros((ticks, ends[-1]))  # takes memory where it is written
 
     def _put(self, name: str, values: Any) -> None:
         self.rows[:, self.places[name]] = np.reshape(values, (len(self.rows), -1))
@@ -75,9 +74,12 @@ class LoggedFlight:
     def _of_run(self, trace: Trace | None, file: Path) -> None:
         if trace is None or "program" not in trace.arrays:
             raise ConfigError(f"{file} has no flight under the QP law")
-        self.config, self.scene, self.points = flown_config(trace), trace.scene, trace.arrays["program"].astype(float)
-        self.limits, arrays = trace.limits, trace.arrays
+        check_drawn(trace.scene)
+        self.config, self.scene, self.points = flown_config(trace), trace.scene, trace.arrays["program"]
+        self.limits, self.seed, arrays = trace.limits, trace.seed, trace.arrays
         self._allot(len(trace.t), trace.thrusts.shape[1])
+        for unknown in ("asked", "path_mm"):
+            self.rows[:, self.places[unknown]] = np.nan
         for name, array in {
             "t": "t", "commanded": "push_reference", "felt": "push_measured", "push": "push_true", "phase": "phase",
             "outcome": "outcome", "step_us": "step_us", "reach": "reach_margin", "position": "position", "tip": "tip",
@@ -95,42 +97,39 @@ class LoggedFlight:
         if not isinstance(law, HybridController):
             raise ConfigError(f"{file} was not flown under the QP law")
         self.config, self.limits = PilotConfig(controller=law.config), law.problem.row_names
-        place = {name: index for index, name in enumerate(self.limits)}
-        found, step = [], law.setpoints.step
-        views = step.outputs | step.inputs
+        step, vehicle = law.setpoints.step, law.config.vehicle
+        self._allot(0, vehicle.geometry.count)
+        most = int(_MOST_BYTES / (8 * (self.rows.shape[1] + step.point.size)))
+        self._allot(most, vehicle.geometry.count)
+        self.points, count, first_ns = np.zeros((most, step.point.size)), 0, 0
+        limit, views = {name: index for index, name in enumerate(self.limits)}, step.outputs | step.inputs
+        tip = np.array(vehicle.tip_position_m)
         for _, command in replayed(flight, flown):
-            if command is None or len(found) >= _MOST_TICKS:
+            if command is None:
                 continue
+            if count == most:
+                self.note = f"only the first {most} ticks are shown: the memory for a log is {_MOST_BYTES / 1e9:g} GB"
+                break
+            first_ns = first_ns or command.stamp_ns
+            push, distance, attitude = views["contact.push"].item(), views["contact.distance"].item(), views["attitude"]
             prices = np.zeros(len(self.limits))
-            for limit in command.active_limits:
-                prices[place[limit.name]] = limit.price
-            push = views["contact.push"].item(), (views["push_reference"] * views["contact.ramp"]).item()
-            distance = views["contact.distance"].item()
-            found.append((command, prices, push, distance, views["attitude"].copy(), step.point.copy()))
-        if not found:
+            for active in command.active_limits:
+                prices[limit[active.name]] = active.price
+            row, self.points[count] = self.rows[count], step.point
+            row[: len(NUMBERS)] = np.nan
+            for name, values in {
+                "t": 1e-9 * (command.stamp_ns - first_ns), "felt": push, "push": push,
+                "commanded": (views["push_reference"] * views["contact.ramp"]).item(),
+                "state": _STATES.index(str(command.safety)), "step_us": 1e6 * command.solve_time_s,
+                "reach": command.reach_margin, "thrusts": command.thrusts, "actual": command.thrusts,
+                "price": prices, "quaternion": attitude, "position": _position(distance, attitude, tip),
+                "tip": (-distance, 0.0, 0.0),
+            }.items():  # fmt: skip
+                row[self.places[name]] = values
+            count += 1
+        if not count:
             raise ConfigError(f"{file} has no tick of a controller up to its first gap")
-        self._allot(len(found), law.config.vehicle.geometry.count)
-        commands, prices, pushes, distances, attitudes, points = zip(*found, strict=True)
-        stamps = np.array([command.stamp_ns for command in commands])
-        tip = np.array(law.config.vehicle.tip_position_m)
-        positions = [
-            _position(distance, attitude, tip) for distance, attitude in zip(distances, attitudes, strict=True)
-        ]
-        self.points = np.array(points)
-        self._put("t", 1e-9 * (stamps - stamps[0]))
-        self._put("felt", [push for push, _ in pushes])
-        self._put("push", [push for push, _ in pushes])
-        self._put("commanded", [reference for _, reference in pushes])
-        self._put("state", [_STATES.index(str(command.safety)) for command in commands])
-        self._put("step_us", [1e6 * command.solve_time_s for command in commands])
-        self._put("reach", [command.reach_margin for command in commands])
-        self._put("thrusts", [command.thrusts for command in commands])
-        self._put("actual", [command.thrusts for command in commands])
-        self._put("price", prices)
-        self._put("quaternion", attitudes)
-        self._put("position", positions)
-        self._put("tip", [(-distance, *(0.0, 0.0)) for distance in distances])
-        self._put("friction", np.zeros((len(found), 2)))
+        self.rows, self.points = self.rows[:count], self.points[:count]
 
 
 def _position(distance: float, attitude: np.ndarray, tip: np.ndarray) -> np.ndarray:
@@ -142,24 +141,21 @@ class LogServer:
     """A recorded flight in the browser: a slider chooses the tick.
 
     Args:
-        file: The log.
+        flight: The flight.
         server: viser's server.
-
-    Raises:
-        IbvsQpError: When the log cannot be read.
     """
 
-    def __init__(self, file: Path, server: viser.ViserServer) -> None:
-        self._flight, self._server = LoggedFlight(file), server
-        flight = self._flight
+    def __init__(self, flight: LoggedFlight, server: viser.ViserServer) -> None:
+        self._flight, self._server, self._showing = flight, server, threading.Lock()  # viser has a pool of threads
         self._what_if = WhatIf(straightened(flight.config.controller))
-        self._scene = LiveScene(server, flight.scene, flight.config)
+        self._scene = LiveScene(server, flight.scene, flight.config, flight.seed)
         vehicle, gui = flight.config.controller.vehicle, server.gui
         self._limits = np.array(vehicle.thrust_min), np.array(vehicle.thrust_max)
         last = len(flight.rows) - 1
-        tick = gui.add_slider(
-            "tick", 0, last, 1, 0, hint=f"Tick of {file}; one is {flight.config.controller.tick_s:g} s."
-        )
+        hint = f"Tick of the log; one is {flight.config.controller.tick_s:g} s."
+        tick = gui.add_slider("tick", 0, last, 1, 0, hint=hint)
+        if flight.note:
+            gui.add_markdown(flight.note)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Why"):
             self._why = gui.add_markdown("")
@@ -167,23 +163,25 @@ class LogServer:
             charts = Charts(gui, flight.places, flight.limits, self._what_if.rotors, kept_s=math.inf)
         charts.add(flight.rows[:: max(len(flight.rows) // _MOST_ROWS, 1)])
         charts.show()
-        tick.on_update(lambda _: self.show(tick.value))
+        tick.on_update(guarded(lambda _: self.show(tick.value)))
         self.show(0)
 
     def show(self, tick: int) -> None:
-        """Show a tick."""
+        """Show a tick, the last one for a later one."""
         flight = self._flight
+        tick = min(max(tick, 0), len(flight.rows) - 1)
         frame = {"row": flight.rows[tick], "ghost": None, "limits": self._limits, "running": False}
-        self._scene.show(frame, flight.places)
-        explained = self._what_if.explain(flight.points[tick])
-        head = f"**Tick {tick}, t = {flight.rows[tick, 0]:.3f} s**"
-        self._why.content = head + "\n\n" + markdown(explained, None, self._what_if.rotors)
+        with self._showing:
+            self._scene.show(frame, flight.places)
+            explained = self._what_if.explain(flight.points[tick])
+            head = f"**Tick {tick}, t = {flight.rows[tick, 0]:.3f} s**"
+            self._why.content = head + "\n\n" + markdown(explained, None, self._what_if.rotors)
 
     def run(self, browser: bool, ready: Callable[[str], None]) -> None:
         """Serve until Ctrl-C."""
         ready(address(self._server))
         if browser:
-            webbrowser.open(address(self._server))
+            open_browser(self._server)
         try:
             threading.Event().wait()
         finally:

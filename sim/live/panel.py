@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ibvs_qp.config.errors import IbvsQpError
+from ibvs_qp.config.errors import IbvsQpError, out_of_range
 from ibvs_qp.config.gains import Gains, Weights
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.solver import SOLVERS, SolverSettings
@@ -21,6 +22,7 @@ from sim.live.disturbances import BUTTONS, faults
 from sim.live.explaining import CEILING, WhatIf, markdown
 from sim.live.process import FASTEST, SLOWEST
 from sim.live.rows import KEPT_S
+from sim.live.site import guarded
 
 #: Sections in the panel: title, class, and names of the fields.
 _SECTIONS = {
@@ -36,8 +38,24 @@ _RANGE, _END = 9, 1.005
 #: Factors on a value of an explained tick, in decades, and fastest repetition of a message to one browser [s].
 _WHAT_IF_DECADES, _NOTICE_S = 2.0, 1.0
 
+#: Parts of the scene that are shown or not: label, attribute of the scene, whether at the beginning, and hint.
+_VIEWS = (
+    ("analytic law (ghost)", "show_ghost", True, "The analytic law, flying the same seed."),
+    ("attainable push", "show_reach", False, "Forces that the tip can hold, as a polytope."),
+)
+
 #: Sends a command to the flight.
 Send = Callable[..., None]
+
+
+def _check(handle: Any) -> None:
+    """Refuse a value that the widget does not offer; the browser rounds by less than a step."""
+    if isinstance(handle, viser.GuiSliderHandle):
+        low, high = handle.min - handle.step, handle.max + handle.step
+        if not low <= handle.value <= high:  # nor NaN
+            raise out_of_range(handle.label, handle.value, "", f"allowed is {handle.min:g} to {handle.max:g}")
+    elif isinstance(handle, viser.GuiDropdownHandle) and handle.value not in handle.options:
+        raise out_of_range(handle.label, handle.value, "", f"allowed is one of {', '.join(handle.options)}")
 
 
 class Control:
@@ -97,14 +115,22 @@ class Panel:
         settings: Values of all settings.
         what_if: Explains ticks.
         save: Called by the button.
+        view: Called with the name of a part of the scene, and whether it is shown.
     """
 
     def __init__(
-        self, server: viser.ViserServer, send: Send, settings: dict[str, Any], what_if: WhatIf, save: Callable[[], None]
+        self,
+        server: viser.ViserServer,
+        send: Send,
+        settings: dict[str, Any],
+        what_if: WhatIf,
+        save: Callable[[], None],
+        view: Callable[[str, bool], None],
     ) -> None:
         self._server, self._send, self._what_if, self._save = server, send, what_if, save
         self._settings, self._controls = settings, dict[str, Control]()
         self._writer: int | None = None
+        self._updating = threading.Lock()  # viser has a pool of threads
         self._noticed: dict[int, float] = {}
         self._ticks = self._first = 0
         self.tick_s, self._point = 0.004, None
@@ -120,8 +146,9 @@ class Panel:
         with tabs.add_tab("Why"):
             self._why()
         with tabs.add_tab("View"):
-            self.ghost = gui.add_checkbox("analytic law (ghost)", True, hint="The analytic law, flying the same seed.")
-            self.reach = gui.add_checkbox("attainable push", False, hint="Forces that the tip can hold, as a polytope.")
+            for label, name, shown, hint in _VIEWS:
+                box = gui.add_checkbox(label, shown, hint=hint)
+                self._input(box, lambda name=name, box=box: view(name, box.value))
         with tabs.add_tab("Save"):
             self._button("Save preset, session and log", self._save)
             self.saved = gui.add_markdown("Nothing is saved yet.")
@@ -157,8 +184,30 @@ class Panel:
 
     def _button(self, label: str, act: Callable[[], None], hint: str | None = None) -> Any:
         button = self._server.gui.add_button(label, hint=hint)
-        button.on_click(lambda event: act() if self._writes(event) else None)
+        button.on_click(guarded(lambda event: act() if self._writes(event) else None))
         return button
+
+    def _input(self, handle: Any, act: Callable[[], None] = lambda: None) -> Any:
+        """An input of the writer's: the value of a watcher, and one that is refused, is put back."""
+        last = [handle.value]
+
+        def back() -> None:
+            handle.value = last[0]
+
+        def update(event: Any) -> None:
+            if event.client is None:  # set by the server
+                last[0] = handle.value
+                return
+            with self._updating:
+                if not self._writes(event):
+                    back()
+                    return
+                _check(handle)
+                act()
+                last[0] = handle.value
+
+        handle.on_update(guarded(update, back))
+        return handle
 
     # Parts of the panel.
 
@@ -171,18 +220,19 @@ class Panel:
             "1 tick": lambda: send("step", 1),
             "25 ticks": lambda: send("step", 25),
         }
-        moves.on_click(lambda event: acts[moves.value]() if self._writes(event) else None)
+        moves.on_click(guarded(lambda event: acts[moves.value]() if self._writes(event) else None))
         low, high = math.log10(SLOWEST), math.log10(FASTEST)
-        self._rate = gui.add_slider("speed x 1", low, high, 0.05, 0.0, hint="Simulated over real time, in decades.")
+        rate = gui.add_slider("speed x 1", low, high, 0.05, 0.0, hint="Simulated over real time, in decades.")
 
-        @self._rate.on_update
-        def _(event: Any) -> None:
-            if self._writes(event):
-                self._rate.label = f"speed x {10.0**self._rate.value:.2g}"
-                send("rate", 10.0**self._rate.value)
+        def pace() -> None:
+            rate.label = f"speed x {10.0**rate.value:.2g}"
+            send("rate", 10.0**rate.value)
 
-        self._back = gui.add_slider(
-            "back [s]", 0.0, KEPT_S, 0.1, 0.0, hint="Time before now, of the rewind and of the explained tick."
+        self._input(rate, pace)
+        self._back = self._input(
+            gui.add_slider(
+                "back [s]", 0.0, KEPT_S, 0.1, 0.0, hint="Time before now, of the rewind and of the explained tick."
+            )
         )
         self._button(
             "Rewind and fork", lambda: send("rewind", self._cursor()),
@@ -202,7 +252,7 @@ class Panel:
             self._solver = gui.add_dropdown(
                 "solver", SOLVERS, initial_value=self._settings["solver.name"], hint=solver.metadata["doc"]
             )
-            self._solver.on_update(lambda event: self._changed(event, "set", {"solver.name": self._solver.value}))
+            self._input(self._solver, lambda: self._change("set", {"solver.name": self._solver.value}))
         for section, (title, kind) in _SECTIONS.items():
             fields = {field.name: field for field in dataclasses.fields(kind)}
             with gui.add_folder(title, expand_by_default=section == "weights"):
@@ -211,28 +261,22 @@ class Panel:
 
     def _add(self, kind: str, name: str, key: str, field: dataclasses.Field[Any]) -> None:
         control = self._controls[name] = Control(self._server.gui, name, field, self._settings[name])
+        self._input(control.handle, lambda: self._change(kind, {key: control.value}))
 
-        @control.handle.on_update
-        def _(event: Any) -> None:
-            self._changed(event, kind, {key: control.value})
-
-    def _changed(self, event: Any, kind: str, values: dict[str, Any]) -> None:
-        if event.client is None:
-            return
-        if self._writes(event):
-            self._send("change", kind, values, time.monotonic())
-        else:
-            self.show_settings(self._settings)
+    def _change(self, kind: str, values: dict[str, Any]) -> None:
+        self._send("change", kind, values, time.monotonic())
 
     def _disturb(self) -> None:
         gui, rotors = self._server.gui, self._what_if.rotors
-        rotor = gui.add_dropdown("rotor", rotors, initial_value=rotors[0], hint="Rotor that is lost or weak.")
+        rotor = self._input(
+            gui.add_dropdown("rotor", rotors, initial_value=rotors[0], hint="Rotor that is lost or weak.")
+        )
         for label in BUTTONS:
             self._button(label, lambda label=label: self._strike(label, rotor.value))
 
     def _strike(self, label: str, rotor: str) -> None:
         for values in faults(label, rotor):
-            self._send("change", "fault", values, time.monotonic())
+            self._change("fault", values)
 
     def _why(self) -> None:
         gui = self._server.gui
@@ -249,7 +293,7 @@ class Panel:
             "Pause, and explain a tick: fractions of the cost, prices of limits, lost wrench."
         )
         for handle in (self._what, self._factor):
-            handle.on_update(lambda event: self.explain() if event.client is None or self._writes(event) else None)
+            self._input(handle, self.explain)
 
     # From the flight.
 

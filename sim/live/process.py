@@ -1,9 +1,10 @@
-"""The process of the flight: steps a session at the rate of the clock, obeys commands, and sends frames."""
+"""The process of the flight: steps a session at the rate of the clock, executes commands, and sends frames."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import signal
 import time
 from multiprocessing.connection import Connection
@@ -15,10 +16,8 @@ import numpy as np
 
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.errors import ConfigError, IbvsQpError
-from ibvs_qp.config.settings import from_dict
+from ibvs_qp.config.errors import IbvsQpError, out_of_range
 from ibvs_qp.model.inputs import setting_values
-from sim.flight.jobs import PressJob
 from sim.live.camera_picture import packed_picture
 from sim.live.presets import changes_text
 from sim.live.rows import LiveLoop
@@ -69,7 +68,7 @@ class Pace:
 
 
 class FlightProcess:
-    """Obeys commands and flies: `run` returns when the connection closes.
+    """Executes commands and flies: `run` returns when the connection closes.
 
     Commands are tuples of a name and arguments, see the methods ``do_*``. Replies: ("frame", table), ("changed",
     table), ("refused", text), ("rewound", tick, settings), ("point", ...), ("saved", text).
@@ -81,12 +80,9 @@ class FlightProcess:
     """
 
     def __init__(self, connection: Connection, start: Start, ghost: bool) -> None:
-        self._connection, self._start, self._ghost = connection, start, ghost
+        self._connection = connection
         self._running, self._over = True, ""
-        self._begin(start)
-
-    def _begin(self, start: Start) -> None:
-        self.session = session = Session(start, self._ghost)
+        self.session = session = Session(start, ghost)
         assert isinstance(session.qp.loop, LiveLoop)
         self._loop, self._recorder = session.qp.loop, session.qp.loop.recorder
         self._pace = Pace(self._loop.pilot.config.controller.tick_s)
@@ -115,12 +111,12 @@ class FlightProcess:
             self._next_frame_s = max(self._next_frame_s + 1.0 / FRAME_HZ, now)
             self._connection.send(("frame", self._frame(now)))
         if self._connection.poll(min(max(wait_s, 0.0), max(self._next_frame_s - now, 0.0))):
-            self._obey(*self._connection.recv())
+            self._execute(*self._connection.recv())
 
-    def _obey(self, name: str, *values: Any) -> None:
+    def _execute(self, name: str, *values: Any) -> None:
         try:
             getattr(self, f"do_{name}")(*values)
-        except (IbvsQpError, ConfigError) as error:
+        except IbvsQpError as error:
             self._connection.send(("refused", str(error), self._settings()))
 
     def do_change(self, kind: str, values: dict[str, Any], sent_s: float) -> None:
@@ -144,6 +140,8 @@ class FlightProcess:
 
     def do_rate(self, rate: float) -> None:
         """Simulated over real time."""
+        if not math.isfinite(rate):
+            raise out_of_range("speed", rate, "", "a finite number is needed")
         self._pace.rate = min(max(rate, SLOWEST), FASTEST)
         self._pace.anchor(self.session.ticks)
 
@@ -151,24 +149,15 @@ class FlightProcess:
         """Pause at an earlier tick of the last minute."""
         self._running, self._over = False, ""
         self.session.rewind(tick)
-        self._sent, self._sent_events = self.session.ticks, len(self._recorder.events)
+        self._sent, self._sent_events = self.session.ticks, self._recorder.noted
         self._paint_shown = False
         self._connection.send(("rewound", self.session.ticks, self._settings()))
 
-    def do_restart(self, seed: int, press: dict[str, Any] | None) -> None:
-        """Begin anew with another seed or job."""
-        self.session.close()
-        job = None if press is None else from_dict(PressJob, press)
-        self._start, self._over = dataclasses.replace(self._start, seed=seed, press=job), ""
-        self._begin(self._start)
-        self._connection.send(("rewound", 0, self._settings()))
-
     def do_point(self, tick: int) -> None:
-        """Send the inputs of the program of a tick, and its row."""
+        """Send the inputs of the program of a tick."""
         tick = min(max(tick, 0), self._recorder.ticks - 1)
-        rows = self._recorder.rows(tick, tick + 1)
-        if len(rows):
-            self._connection.send(("point", tick, self._recorder.point(tick), rows[0]))
+        if len(self._recorder.rows(tick, tick + 1)):
+            self._connection.send(("point", tick, self._recorder.point(tick)))
 
     def do_save(self, folder: str) -> None:
         """Write the session and the preset with its changes."""
@@ -202,8 +191,7 @@ class FlightProcess:
             self._sent = session.ticks
         last = recorder.rows(session.ticks - 1, session.ticks)
         ghost = session.ghost.loop.recorder if session.ghost is not None else None  # type: ignore[attr-defined]
-        new = recorder.events[self._sent_events :] if len(recorder.events) >= self._sent_events else recorder.events
-        self._sent_events = len(recorder.events)
+        new, self._sent_events = recorder.events_since(self._sent_events), recorder.noted
         table: dict[str, Any] = {
             "ticks": session.ticks,
             "first": session.first,

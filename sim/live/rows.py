@@ -28,7 +28,7 @@ _STATE, _OUTCOME = ({each: index for index, each in enumerate(kind)} for kind in
 _PHASE = {phase: index for index, phase in enumerate(PHASES)}
 #: Numbers of a row: times in s and us, pushes in N, path error in mm, angles in deg.
 NUMBERS = "t wall_s asked commanded felt push path_mm roll pitch step_us state phase outcome reach".split()
-#: Readings of the plant in a row, and their widths.
+#: Readings of the plant in a row, and their widths: the last entries of each; of friction, those along the wall.
 READ = {"position": 3, "quaternion": 4, "tip": 3, "friction": 2}
 
 
@@ -40,6 +40,7 @@ class LiveRecorder(Recorder):
         limits: Names of the limits, in the order of their prices.
         wall_s: Clock time at the beginning of the tick [s], written by the owner.
         events: The last events: phases, faults, refusals.
+        noted: Events so far.
     """
 
     def __init__(self, scene: Scene, options: FlightOptions, world: World, pilot: Pilot) -> None:
@@ -50,13 +51,16 @@ class LiveRecorder(Recorder):
         widths = {**dict.fromkeys(NUMBERS, 1), **READ, "thrusts": rotors, "actual": rotors, "price": len(self.limits)}
         ends = np.cumsum([0, *widths.values()]).tolist()
         self.places = {name: slice(*ends[index : index + 2]) for index, name in enumerate(widths)}
-        self._read = np.concatenate([np.arange(PLACES[name].start, PLACES[name].stop) for name in READ])
+        self._read = np.concatenate(
+            [np.arange(PLACES[name].stop - width, PLACES[name].stop) for name, width in READ.items()]
+        )
         self.capacity = ticks_in(KEPT_S + 1.0, pilot.config.controller.tick_s)
         self._rows = np.full((self.capacity, ends[-1]), math.nan)
         points = pilot.setpoints.step.point.size if self.limits else 0
         self._points, self.ticks = np.zeros((self.capacity, points)), 0
         self.wall_s = 0.0
         self.events: list[Event] = []
+        self.noted = 0
         self._logged, self._refused = 0, ""
 
     def tick(self, frame: SensorFrame, command: Command) -> None:
@@ -84,7 +88,12 @@ class LiveRecorder(Recorder):
     def note(self, time_s: float, kind: str, text: str) -> None:
         """Keep an event from outside the pilot."""
         self.events.append(Event(t=time_s, kind=kind, text=text))
+        self.noted += 1
         del self.events[:-MOST_EVENTS]
+
+    def events_since(self, noted: int) -> list[Event]:
+        """Events after so many, as far as they are kept."""
+        return self.events[max(len(self.events) - (self.noted - noted), 0) :]
 
     def rows(self, first: int, end: int, every: int = 1) -> np.ndarray:
         """Copies of the rows of some ticks, as far as they are kept, (rows, width)."""

@@ -17,15 +17,18 @@ import viser
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from allocation.wrench_facets import WrenchFacets
-from ibvs_qp.frames import GRAVITY, rotation_from_quaternion
+from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, skew
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.quaternion import multiply
 from sim.live.camera_picture import picture_of
 from sim.live.process import PAINT_PX_M
+from sim.live.site import guarded
 from sim.world.board import BoardGeometry
 from sim.world.mjcf import build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION, quaternion_of_axes, rotor_quaternion
 from sim.world.scene import Scene
-from sim.world.true_vehicle import true_vehicle
+from sim.world.true_vehicle import TrueVehicle, true_vehicle
 
 #: Length of a drawn newton [m]: of arrows and polytope, and of thrust bars.
 FORCE_M_N, THRUST_M_N = 0.02, 0.005
@@ -52,8 +55,20 @@ def turned(quaternion: np.ndarray) -> np.ndarray:
     return FLIP_QUATERNION * quaternion
 
 
+def check_drawn(scene: Scene) -> None:
+    """Refuse a scene that the page does not draw.
+
+    Raises:
+        ConfigError: When its wall is no upright plane.
+    """
+    surface = scene.surface
+    if surface.kind != "plane" or surface.lean_deg:
+        shape = f"surface.kind = {surface.kind!r}, surface.lean_deg = {surface.lean_deg:g}"
+        raise ConfigError(f"{shape} is refused: live draws flat upright walls alone")
+
+
 def draw_board(server: viser.ViserServer, scene: Scene) -> viser.ImageHandle:
-    """Board, wall and path of the strokes; every shape of a board is drawn here.
+    """Board, wall and path of the strokes of a flat wall, see `check_drawn`.
 
     Returns:
         The picture on the board, see `board_picture`.
@@ -92,9 +107,8 @@ def board_picture(scene: Scene, painted: np.ndarray | None) -> np.ndarray:
     return ((1.0 - part) * colors[0] + part * colors[1]).astype(np.uint8)
 
 
-def vehicle_meshes(scene: Scene, config: PilotConfig) -> tuple[trimesh.Trimesh, list[trimesh.Trimesh]]:
+def vehicle_meshes(scene: Scene, vehicle: TrueVehicle) -> tuple[trimesh.Trimesh, list[trimesh.Trimesh]]:
     """Vehicle without its propellers, and one propeller in its rotor's axes per rotor: of the simulator's own model."""
-    vehicle = true_vehicle(scene, config.controller.vehicle, 0)
     model, ids = build_model(scene, vehicle)
     bodies = {ids.vehicle}
     for body in range(model.nbody):
@@ -137,16 +151,12 @@ class ReachPolytope:
     """Forces that the tip can hold against the wall without a moment, in the body's axes.
 
     Args:
-        scene: The vehicle flown.
-        config: Its nominal values.
+        vehicle: The vehicle flown.
     """
 
-    def __init__(self, scene: Scene, config: PilotConfig) -> None:
-        self._vehicle = true_vehicle(scene, config.controller.vehicle, 0)
-        self._facets = WrenchFacets(self._vehicle.geometry)
-        tip = np.array(self._vehicle.tip_position_m)
-        arm = np.array([[0.0, -tip[2], tip[1]], [tip[2], 0.0, -tip[0]], [-tip[1], tip[0], 0.0]])
-        self._wrench = np.vstack((np.eye(3), arm))
+    def __init__(self, vehicle: TrueVehicle) -> None:
+        self._vehicle, self._facets = vehicle, WrenchFacets(vehicle.geometry)
+        self._wrench = np.vstack((np.eye(3), skew(np.array(vehicle.tip_position_m))))
 
     def mesh(
         self, quaternion: np.ndarray, lower: np.ndarray, upper: np.ndarray
@@ -175,22 +185,23 @@ class LiveScene:
         server: viser's server.
         scene: The truth.
         config: Configuration of the vehicle.
+        seed: Draws the errors of the vehicle.
     """
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, config: PilotConfig) -> None:
-        self._server, self._scene, self._config = server, scene, config
+    def __init__(self, server: viser.ViserServer, scene: Scene, config: PilotConfig, seed: int) -> None:
+        self._server, self._scene = server, scene
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
         self._board = draw_board(server, scene)
-        self.vehicle = vehicle = true_vehicle(scene, config.controller.vehicle, 0)
-        body, blades = vehicle_meshes(scene, config)
+        vehicle = true_vehicle(scene, config.controller.vehicle, seed)
+        body, blades = vehicle_meshes(scene, vehicle)
         add = server.scene
         self._frame = add.add_frame("/vehicle", show_axes=False)
         add.add_mesh_trimesh("/vehicle/body", body)
         geometry, self._rotors = vehicle.geometry, []
         self._hubs = [FLIP * place for place in geometry.positions]
         self._ups = [FLIP * axis for axis in geometry.axes]
-        self._turns = [rotor_quaternion(axis) for axis in geometry.axes]
+        self._turns = [rotor_quaternion(axis).tolist() for axis in geometry.axes]
         for index, blade in enumerate(blades):
             hub = add.add_frame(
                 f"/vehicle/rotor_{index}", show_axes=False, wxyz=self._turns[index], position=self._hubs[index]
@@ -208,7 +219,7 @@ class LiveScene:
         self._bar_colors, both = np.zeros(0, np.uint8), np.zeros((2, 2, 3))
         forces = np.array([_PUSH, _FRICTION], np.uint8)
         self._forces = add.add_arrows("/forces", both, forces, shaft_radius=0.008, head_radius=0.02, head_length=0.04)
-        self._reach_shape = ReachPolytope(scene, config)
+        self._reach_shape = ReachPolytope(vehicle)
         tip = FLIP * vehicle.tip_position_m
         self._reach = add.add_mesh_simple(
             "/vehicle/reach", np.zeros((3, 3)), np.zeros((1, 3), int), color=_REACH, opacity=0.18, side="double",
@@ -237,9 +248,7 @@ class LiveScene:
         camera.fov, camera.look_at, camera.up = _FOV, target, (0.0, 0.0, 1.0)
         camera.position = target + _VIEW * (_SEEN_M / math.sin(0.5 * _FOV))
 
-        @self._server.on_client_connect
-        def _(client: viser.ClientHandle) -> None:
-            self.fit(client)
+        self._server.on_client_connect(guarded(self.fit))
 
     def fit(self, client: viser.ClientHandle) -> None:
         """Move a narrow window's camera back until the width of the scene fits."""
@@ -296,7 +305,7 @@ class LiveScene:
                 if (index + self._frames) % _EVERY:
                     continue
                 half = 0.5 * self._angles[index]
-                self._rotors[index].wxyz = _product(self._turns[index], (math.cos(half), 0.0, 0.0, math.sin(half)))
+                self._rotors[index].wxyz = multiply(self._turns[index], (math.cos(half), 0.0, 0.0, math.sin(half)))
         self._bars.points, painted = np.array(points, np.float32), np.array(colors, np.uint8)
         if not np.array_equal(painted, self._bar_colors):
             self._bar_colors = self._bars.colors = painted
@@ -310,11 +319,3 @@ class LiveScene:
             self._forces.visible = shown
         if shown:
             self._forces.points = np.array(ends, np.float32)
-
-
-def _product(first: Any, second: Any) -> np.ndarray:
-    (a, b, c, d), (e, f, g, h) = first, second
-    return np.array(
-        (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-         a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)
-    )  # fmt: skip

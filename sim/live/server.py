@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import multiprocessing
 import subprocess
 import sys
 import threading
 import time
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,10 +27,14 @@ from sim.live.process import fly
 from sim.live.rows import STATES
 from sim.live.scene import LiveScene
 from sim.live.session_file import Start
-from sim.live.site import address, stop
+from sim.live.site import address, open_browser, stop
 
 #: Status lines per second [Hz]; longest wait for the first frame, and for the process to end [s].
 _STATUS_HZ, _READY_S, _END_S = 5.0, 120.0, 5.0
+
+
+class FlightEnded(RuntimeError):
+    """The process of the flight has ended by itself."""
 
 
 class LiveServer:
@@ -52,6 +57,7 @@ class LiveServer:
         self._sending, self._closed = threading.Lock(), threading.Event()
         self._log: subprocess.Popen[bytes] | None = None
         self._status_s = self._charts_s = 0.0
+        self._folders = itertools.count(1)
         self._last: dict[str, Any] | None = None
 
     def run(self, browser: bool, ready: Callable[[str], None]) -> None:
@@ -63,6 +69,7 @@ class LiveServer:
 
         Raises:
             ConfigError: When the flight cannot begin.
+            FlightEnded: When its process ends.
         """
         try:
             if not self._connection.poll(_READY_S):
@@ -73,7 +80,7 @@ class LiveServer:
             self._build(*values)
             ready(address(self._server))
             if browser:
-                webbrowser.open(address(self._server))
+                open_browser(self._server)
             while True:
                 self._read()
         finally:
@@ -90,28 +97,32 @@ class LiveServer:
             self._flight.join(_END_S)
             if self._flight.is_alive():
                 self._flight.kill()
-            if self._log is not None and self._log.poll() is None:
+            if self._log is not None:
                 self._log.terminate()
+                try:
+                    self._log.wait(_END_S)
+                except subprocess.TimeoutExpired:
+                    self._log.kill()
+                    self._log.wait()
             stop(self._server)
 
     def _receive(self) -> tuple[Any, ...]:
         try:
             return self._connection.recv()
         except (EOFError, ConnectionError):
-            raise ConfigError("the process of the flight has ended") from None
+            raise FlightEnded("the process of the flight has ended") from None
 
     def _build(self, places: dict[str, slice], limits: tuple[str, ...], settings: dict[str, Any]) -> None:
         start = self._start
         config = pilot_config(start.scene, start.options("qp"), start.config("qp"))
         self._places, self._tick_s = places, config.controller.tick_s
         server, what_if = self._server, WhatIf(straightened(config.controller))
-        self._scene = LiveScene(server, start.scene, config)
-        self._panel = Panel(server, self._send, settings, what_if, self._save)
+        self._scene = LiveScene(server, start.scene, config, start.seed)
+        view = functools.partial(setattr, self._scene)
+        self._panel = Panel(server, self._send, settings, what_if, self._save, view)
         self._panel.tick_s = self._tick_s
         with self._panel.charts_tab:
             self._charts = Charts(server.gui, places, limits, what_if.rotors)
-        self._panel.ghost.on_update(lambda _: setattr(self._scene, "show_ghost", self._panel.ghost.value))
-        self._panel.reach.on_update(lambda _: setattr(self._scene, "show_reach", self._panel.reach.value))
 
     def _send(self, *command: Any) -> None:
         with self._sending:
@@ -131,9 +142,13 @@ class LiveServer:
                 events += shown["events"]
                 paint = shown["paint"] if shown.get("paint") is not None else paint
             else:
+                if rows:  # those before a rewind belong to the trace before
+                    self._charts.add(np.concatenate(rows))
+                    rows = []
                 getattr(self, f"_on_{kind}")(*values)
-        if shown is not None:
+        if rows:
             self._charts.add(np.concatenate(rows))
+        if shown is not None:
             self._show(shown | {"events": events, "paint": paint})
 
     def _show(self, frame: dict[str, Any]) -> None:
@@ -160,10 +175,13 @@ class LiveServer:
         self._panel.show_settings(settings)
         self._panel.note(f"back at tick {tick}: the trace before is dashed")
 
-    def _on_point(self, tick: int, point: np.ndarray, row: np.ndarray) -> None:
+    def _on_point(self, tick: int, point: np.ndarray) -> None:
         self._panel.explain(tick, point)
 
     def _on_saved(self, folder: str, changes: int) -> None:
+        if self._log is not None:  # two clicks before the first reply
+            self._panel.note(f"{folder} has no log: that of the save before is being flown")
+            return
         command = [sys.executable, "-m", "sim.commands.cli", "live", "--replay", f"{folder}/session.json", "--out"]
         self._log = subprocess.Popen([*command, f"{folder}/run"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self._panel.saved.content = (
@@ -177,5 +195,8 @@ class LiveServer:
             self._panel.saved.content = f"{self._panel.saved.content.rsplit(' The log', 1)[0]} {text}"
 
     def _save(self) -> None:
-        folder = self._out / time.strftime("%Y-%m-%dT%H-%M-%S", time.gmtime())
-        self._send("save", str(folder))
+        if self._log is not None:
+            self._panel.note("refused: the log of the save before is being flown; save after it")
+            return
+        stamp = time.strftime("%Y-%m-%dT%H-%M-%S", time.gmtime())
+        self._send("save", str(self._out / f"{stamp}-{next(self._folders)}"))

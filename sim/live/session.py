@@ -8,12 +8,14 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.config.settings import adjusted, from_dict
+from ibvs_qp.config.solver import SOLVERS
 from ibvs_qp.controller import HybridController
 from ibvs_qp.flight_state import FlightState
 from ibvs_qp.qp.problem import ProgramData
 from sim.faults.kinds import KINDS
+from sim.faults.rotors import RotorFault
 from sim.flight.closed_loop import ClosedLoop
 from sim.flight.options import ticks_in
 from sim.flight.trace import Event
@@ -93,9 +95,10 @@ class Flight:
             solver = values.get("solver.name")
             others = {name: value for name, value in values.items() if name != "solver.name"}
             if isinstance(pilot.controller, HybridController):
+                engine = None if solver is None else self._engine(solver)
                 pilot.controller.adjust(others)  # type: ignore[attr-defined]
                 if solver is not None:
-                    self._use_solver(solver)
+                    self._use(engine, solver)
         elif change.kind == "task":
             if wrong := values.keys() - set(TASK):
                 raise ConfigError(f"{', '.join(sorted(wrong))}: not one of {', '.join(TASK)}")
@@ -104,9 +107,12 @@ class Flight:
         elif change.kind == "fault":
             own = dict(values)
             kind = own.pop("kind", None)
-            if kind not in KINDS:
-                raise ConfigError(f"unknown kind of fault {kind!r}; known kinds: {', '.join(KINDS)}")
-            self.loop.disturb(dataclasses.replace(from_dict(KINDS[kind], own, kind), after="start", delay_s=0.0))
+            if not isinstance(kind, str) or kind not in KINDS:
+                raise ConfigError(f"unknown kind of fault {shown(kind)}; known kinds: {', '.join(KINDS)}")
+            fault, names = from_dict(KINDS[kind], own, kind), pilot.config.controller.vehicle.geometry.names
+            if isinstance(fault, RotorFault) and fault.rotor not in ("", *names):
+                raise ConfigError(f"unknown rotor {shown(fault.rotor)}; known rotors: {', '.join(names)}")
+            self.loop.disturb(dataclasses.replace(fault, after="start", delay_s=0.0))
         else:
             raise ConfigError(f"unknown kind of change {change.kind!r}")
 
@@ -115,7 +121,7 @@ class Flight:
         kept = [each for each in self._snapshots if each.ticks <= tick] or self._snapshots[:1]
         self._snapshots, found, loop = kept, kept[-1], self.loop
         if self.solver != found.solver:
-            self._use_solver(found.solver)
+            self._use(self._engine(found.solver), found.solver)
         loop.pilot.restore(found.pilot)
         found.world.restore()
         loop.command, loop.reason, loop.ticks = found.command, found.reason, found.ticks
@@ -141,18 +147,24 @@ class Flight:
         """Earliest tick that can be rewound to."""
         return self._snapshots[0].ticks if self._snapshots else self.loop.ticks
 
-    def _use_solver(self, name: str) -> None:
+    def _engine(self, name: str) -> Any:
         law = self.loop.pilot.controller
         assert isinstance(law, HybridController)
+        if name not in SOLVERS:
+            raise ConfigError(f"unknown solver.name {shown(name)}; known: {', '.join(SOLVERS)}")
         backend = law.config.solver.backend if name == "osqp" else "python"
         solver = dataclasses.replace(law.config.solver, backend="python")
         solver = dataclasses.replace(dataclasses.replace(solver, name=name), backend=backend)
         try:
-            law.engine = law.engine_kind(law.problem, solver, ProgramData(law.problem, law.setpoints.step))
+            return law.engine_kind(law.problem, solver, ProgramData(law.problem, law.setpoints.step))
         except ImportError as error:
             raise ConfigError(f"solver.name = {name!r}: {error.name} is not installed, of the extra solvers") from None
-        law.engine.reset()
-        self.solver = name
+
+    def _use(self, engine: Any, name: str) -> None:
+        law = self.loop.pilot.controller
+        assert isinstance(law, HybridController)
+        law.engine, self.solver = engine, name
+        engine.reset()
 
 
 class Session:

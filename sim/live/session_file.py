@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import ibvs_qp
-from ibvs_qp.config.errors import ConfigError
+from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.config.files import UnreadableFile, parse_toml
 from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
@@ -127,7 +127,9 @@ class SessionFile:
 
 
 def _change(table: Any) -> Change:
-    values, kind = dict(table["values"]), str(table["kind"])
+    values, kind = dict(table["values"]), table["kind"]
+    if not isinstance(kind, str):
+        raise ValueError(f"kind {shown(kind)}")
     return Change(tick=_count(table["tick"], MOST_TICKS), kind=kind, values=values)
 
 

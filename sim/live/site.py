@@ -7,6 +7,10 @@ import io
 import logging
 import socket
 import sys
+import threading
+import webbrowser
+from collections.abc import Callable
+from typing import Any
 
 import viser
 
@@ -23,7 +27,26 @@ class _OneLine(logging.Handler):
         """Print the line."""
         error = record.exc_info[1] if record.exc_info else None
         text = f"{record.getMessage()} ({type(error).__name__}: {error})" if error is not None else record.getMessage()
-        print(f"ibvs-qp live: ignored: {' '.join(text.split())[:_LINE]}", file=sys.stderr)
+        ignored(text)
+
+
+def ignored(text: str) -> None:
+    """Print one line about an input that is ignored."""
+    print(f"ibvs-qp live: ignored: {' '.join(text.split())[:_LINE]}", file=sys.stderr)
+
+
+def guarded(act: Callable[..., None], undo: Callable[[], None] | None = None) -> Callable[..., None]:
+    """A callback of the page: an error is one line, and is undone."""
+
+    def call(*values: Any) -> None:
+        try:
+            act(*values)
+        except Exception as error:
+            ignored(f"{type(error).__name__}: {error}")
+            if undo is not None:
+                undo()
+
+    return call
 
 
 def quiet_server() -> None:
@@ -53,6 +76,11 @@ def open_server(host: str, port: int) -> viser.ViserServer:
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     return server
+
+
+def open_browser(server: viser.ViserServer) -> None:
+    """Open the page; a browser in the terminal would block the caller."""
+    threading.Thread(target=webbrowser.open, args=(address(server),), daemon=True).start()
 
 
 def address(server: viser.ViserServer) -> str:

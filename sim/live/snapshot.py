@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import itertools
 import types
 from collections import deque
 from collections.abc import Callable
@@ -31,22 +32,25 @@ _ITERATOR = type(iter(np.zeros((1, 1))))
 
 
 class Blocks:
-    """Copies of large arrays in blocks of rows; unchanged blocks are shared between copies."""
+    """Copies of large arrays in blocks of rows; unchanged blocks are shared between successive snapshots."""
 
     def __init__(self) -> None:
         self._last: dict[int, list[np.ndarray]] = {}
+        self._present: dict[int, list[np.ndarray]] = {}
 
     def copy(self, array: np.ndarray) -> list[np.ndarray]:
         """The array as a list of blocks, read-only."""
         blocks, last = np.array_split(array, min(_BLOCKS, len(array))), self._last.get(id(array), [])
         kept = [
-            old if old.shape == new.shape and np.array_equal(old, new) else new.copy()
-            for old, new in zip(last or blocks, blocks, strict=True)
+            old if old is not None and _same(old, new) else new.copy()
+            for old, new in itertools.zip_longest(last[: len(blocks)], blocks)
         ]
-        if not last:
-            kept = [block.copy() for block in blocks]
-        self._last[id(array)] = kept
+        self._present[id(array)] = kept
         return kept
+
+    def end(self) -> None:
+        """End a snapshot; arrays that are not in it are forgotten: their numbers may belong to others later."""
+        self._last, self._present = self._present, {}
 
 
 class WorldState:
@@ -60,12 +64,13 @@ class WorldState:
 
     def __init__(self, roots: tuple[Any, ...], apart: tuple[Any, ...], blocks: Blocks) -> None:
         self._restorers: list[Restorer] = []
-        self._blocks = blocks
+        self._blocks = blocks  # shared with the snapshots before
         self._alive: list[Any] = []  # numbers of objects must not be used again meanwhile
         self._known = {id(each) for each in apart}
         queue = list(roots)
         while queue:
             queue.extend(self._keep(queue.pop()))
+        blocks.end()
 
     def restore(self) -> None:
         """Put everything back."""
@@ -114,6 +119,10 @@ class WorldState:
             blocks = self._blocks.copy(array)
             return lambda: np.concatenate(blocks, out=array)  # type: ignore[arg-type, return-value]
         return functools.partial(np.copyto, array, array.copy())
+
+
+def _same(old: np.ndarray, new: np.ndarray) -> bool:
+    return old.dtype == new.dtype and old.shape == new.shape and np.array_equal(old, new)
 
 
 def _refill(container: Any, content: Any) -> None:

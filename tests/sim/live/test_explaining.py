@@ -84,3 +84,25 @@ def test_a_log_has_the_rows_and_programs_of_its_flight(tmp_path):
     np.testing.assert_allclose(explained.thrusts, flight.rows[60, flight.places["thrusts"]], atol=1e-3)
     with pytest.raises(ConfigError):
         LoggedFlight(tmp_path / "nothing.mcap")
+
+
+def test_an_mcap_log_has_the_same_programs_as_far_as_memory_goes(tmp_path, monkeypatch):
+    for module in ("viser", "mcap"):
+        pytest.importorskip(module, reason=f"the extra of {module} is not installed")
+    from sim.live import log_scene
+
+    options = dataclasses.replace(START.options("qp"), mcap=True, journal=str(tmp_path))
+    loop = ClosedLoop(SCENE, options, START.config("qp"), START.job)
+    for _ in range(100):
+        loop.sense()
+        loop.advance()
+    loop.close()
+    trace, flight = loop.trace(), log_scene.LoggedFlight(tmp_path / "qp.mcap")
+    assert len(flight.rows) == len(flight.points) == 100 and not flight.note
+    np.testing.assert_allclose(flight.rows[:, flight.places["thrusts"]], trace.thrusts, atol=1e-6)
+    explained = WhatIf(straightened(flight.config.controller)).explain(flight.points[60])
+    assert explained is not None
+    np.testing.assert_allclose(explained.thrusts, trace.thrusts[60], atol=1e-3)
+    monkeypatch.setattr(log_scene, "_MOST_BYTES", 8 * 40 * (flight.rows.shape[1] + flight.points.shape[1]))
+    cut = log_scene.LoggedFlight(tmp_path / "qp.mcap")
+    assert len(cut.rows) == 40 and "40 ticks" in cut.note

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -17,27 +15,7 @@ websockets = pytest.importorskip("websockets")
 psutil = pytest.importorskip("psutil")
 
 #: Messages that are no messages of viser.
-HOSTILE = ["text", b"", b"\xff" * 64, b"\x81\xa4type\xa4Evil", b"\xdf\xff\xff\xff\xff", os.urandom(4096)]
-
-
-def free_port() -> int:
-    """A port that nothing listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@pytest.fixture
-def live():
-    """A running server and its port."""
-    port = free_port()
-    command = [sys.executable, "-m", "sim.commands.cli", "live", "--no-open", "--port", str(port), "--press", "60"]
-    flight = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert flight.stdout is not None
-    assert f"http://127.0.0.1:{port}" in flight.stdout.readline()
-    yield flight, port
-    if flight.poll() is None:
-        flight.kill()
+HOSTILE = ["text", b"", b"\xff" * 64, b"\x81\xa4type\xa4Evil", b"\xdf\xff\xff\xff\xff", bytes(range(256)) * 16]
 
 
 async def connect(port: int):
@@ -61,8 +39,8 @@ async def attack(port: int) -> int:
     return frames
 
 
-def test_hostile_messages_are_one_line_each_and_a_signal_ends_both_processes(live):
-    flight, port = live
+def test_hostile_messages_are_one_line_each_and_a_signal_ends_both_processes(serve):
+    flight, port = serve("--press", "60")
     children = psutil.Process(flight.pid).children(recursive=True)
     assert any("spawn_main" in " ".join(child.cmdline()) for child in children)
     assert asyncio.run(attack(port)) > 10
@@ -70,10 +48,21 @@ def test_hostile_messages_are_one_line_each_and_a_signal_ends_both_processes(liv
     output, errors = flight.communicate(timeout=60)
     assert flight.returncode == 143
     assert "later than one tick" in output
-    assert "Traceback" not in errors
-    assert len([line for line in errors.splitlines() if "ignored" in line]) <= len(HOSTILE)
+    *lines, last = errors.splitlines()
+    assert last == "ibvs-qp: interrupted"
+    assert all(line.startswith("ibvs-qp live: ignored: ") for line in lines), errors
+    assert len(lines) == len(HOSTILE), errors
     _, alive = psutil.wait_procs(children, timeout=10)
     assert not alive
+
+
+def test_a_flight_that_dies_is_exit_code_1_and_one_line(serve):
+    flight, _ = serve("--press", "60", "--no-ghost")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    next(child for child in children if "spawn_main" in " ".join(child.cmdline())).kill()
+    _, errors = flight.communicate(timeout=60)
+    assert flight.returncode == 1
+    assert errors.splitlines() == ["ibvs-qp: the process of the flight has ended"]
 
 
 @pytest.mark.parametrize(
@@ -85,10 +74,13 @@ def test_hostile_messages_are_one_line_each_and_a_signal_ends_both_processes(liv
         (["--preset", "tarot_t960_paper"], "analytic"),
         (["--replay", "nothing.json"], "nothing.json"),
         (["--log", "nothing.mcap"], "nothing.mcap"),
+        (["--json"], "--json"),
+        (["--scene", "leaning.toml"], "lean_deg"),
     ],
 )
-def test_unusable_options_are_one_line(words, named):
+def test_unusable_options_are_one_line(words, named, tmp_path):
+    (tmp_path / "leaning.toml").write_text("[surface]\nlean_deg = 5.0\n")
     command = [sys.executable, "-m", "sim.commands.cli", "live", "--no-open", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
     assert done.returncode == 2
     assert named in done.stderr and len(done.stderr.splitlines()) == 1

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+import multiprocessing
 
 import numpy as np
 import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.files import UnreadableFile
+from sim.commands.live import Live
 from sim.flight.closed_loop import ClosedLoop
 from sim.flight.jobs import PressJob
-from sim.live.rows import LiveLoop
+from sim.live.process import FlightProcess
+from sim.live.rows import MOST_EVENTS, LiveLoop
 from sim.live.session import SNAPSHOTS, Session, repeat
 from sim.live.session_file import SessionFile, Start
 from sim.live.snapshot import Blocks, WorldState
@@ -109,20 +113,36 @@ def test_a_weight_acts_at_the_next_tick():
         ("set", {"solver.name": "abacus"}, "abacus"),
         ("task", {"push_n": 1e9}, "push_n"),
         ("task", {"rows": 3}, "rows"),
+        ("set", {"solver.name": ["osqp"]}, "solver.name"),
+        ("set", {"weights.push": 0.2, "solver.name": "abacus"}, "abacus"),
+        ("set", {"weights.pull": 1.0, "solver.name": "daqp"}, "weights.pull"),
         ("fault", {"kind": "Meteor"}, "Meteor"),
+        ("fault", {"kind": ["Derate"]}, "Derate"),
+        ("fault", {"kind": "Derate", "rotor": "tail"}, "tail"),
         ("fault", {"kind": "SidePush", "force_n": [0.0, 1e9, 0.0]}, "force_n"),
         ("dance", {}, "dance"),
     ],
 )
 def test_refused_changes_change_nothing(kind, values, named):
     session = Session(START)
+    law, solver = session.qp.loop.pilot.controller, session.qp.solver
+    config, engine = law.config, law.engine  # type: ignore[attr-defined]
     with pytest.raises(ConfigError, match=named):
         session.change(kind, values)
     assert session.changes == []
+    assert (law.config, session.qp.solver) == (config, solver) and law.engine is engine  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
-    "damage", [{"schema": 2}, {"seed": -1}, {"ticks": 1e3}, {"changes": [{"tick": 1}]}, {"press": 3}]
+    "damage",
+    [
+        {"schema": 2},
+        {"seed": -1},
+        {"ticks": 1e3},
+        {"changes": [{"tick": 1}]},
+        {"press": 3},
+        {"changes": [{"tick": 1, "kind": ["set"], "values": {}}]},
+    ],
 )
 def test_damaged_files_are_refused(tmp_path, damage):
     file = tmp_path / "session.json"
@@ -143,12 +163,44 @@ def test_snapshots_and_rows_are_bounded():
 
 def test_large_arrays_share_unchanged_blocks():
     blocks, array = Blocks(), np.zeros((640, 1024))
-    first, second = blocks.copy(array), blocks.copy(array)
+    first, _ = blocks.copy(array), blocks.end()
+    second, _ = blocks.copy(array), blocks.end()
     array[5] = 1.0
     third = blocks.copy(array)
     assert all(one is two for one, two in zip(first, second, strict=True))
     assert [one is two for one, two in zip(second, third, strict=True)].count(False) == 1
+    blocks._last = {id(array): first[:3]}  # of a gone array with the same number
+    assert len(blocks.copy(array)) == len(first)
     state = WorldState(([array],), (), blocks)
+    assert list(blocks._last) == [id(array)]
+    WorldState(([],), (), blocks)
+    assert not blocks._last
     array[:] = 2.0
     state.restore()
     assert np.array_equal(array[5], np.ones(1024)) and not array[6:].any()
+
+
+def test_of_many_events_none_is_lost():
+    recorder = Session(START).qp.loop.recorder  # type: ignore[attr-defined]
+    sent, texts = 0, []
+    for index in range(2 * MOST_EVENTS):
+        recorder.note(0.0, "fault", str(index))
+        if index % 7 == 0:
+            texts += [event.text for event in recorder.events_since(sent)]
+            sent = recorder.noted
+    assert texts == [str(index) for index in range(sent)]
+
+
+def test_a_session_flown_again_prints_json(tmp_path, capsys):
+    session = Session(START)
+    fly(session, 5)
+    session.file().write(tmp_path / "session.json")
+    assert Live(replay=tmp_path / "session.json", json=True).run([]) == 0
+    assert json.loads(capsys.readouterr().out) == {"schema": 1, "ticks": 5, "changes": 0, "identical": True}
+
+
+def test_a_rate_that_is_no_number_is_refused():
+    here, there = multiprocessing.Pipe()
+    process = FlightProcess(there, START, ghost=False)
+    process._execute("rate", math.nan)
+    assert here.recv()[0] == "refused" and math.isfinite(process._pace.rate)
