@@ -70,7 +70,6 @@ class Live:
             import viser  # noqa: F401
         except ModuleNotFoundError:
             raise ConfigError("live needs the extra live: pip install -c constraints.txt -e '.[live]'") from None
-        from sim.live.scene import check_drawn
         from sim.live.server import FlightEnded, LiveServer
         from sim.live.site import open_server
 
@@ -82,7 +81,6 @@ class Live:
                 print(f"ibvs-qp live: {flight.note}", file=sys.stderr)
             LogServer(flight, open_server(self.host, self.port)).run(not self.no_open, _announce)
             return 0
-        check_drawn(start.scene)
         server = open_server(self.host, self.port)
         try:
             LiveServer(start, server, self.out or Path("runs/live"), not self.no_ghost).run(not self.no_open, _announce)

@@ -26,7 +26,7 @@ from sim.flight.trace import Trace
 from sim.live.charts import Charts
 from sim.live.explaining import WhatIf, markdown
 from sim.live.rows import NUMBERS, READ
-from sim.live.scene import LiveScene, check_drawn
+from sim.live.scene import LiveScene
 from sim.live.site import address, guarded, open_browser, stop
 from sim.world.scene import Scene
 
@@ -74,7 +74,6 @@ class LoggedFlight:
     def _of_run(self, trace: Trace | None, file: Path) -> None:
         if trace is None or "program" not in trace.arrays:
             raise ConfigError(f"{file} has no flight under the QP law")
-        check_drawn(trace.scene)
         self.config, self.scene, self.points = flown_config(trace), trace.scene, trace.arrays["program"]
         self.limits, self.seed, arrays = trace.limits, trace.seed, trace.arrays
         self._allot(len(trace.t), trace.thrusts.shape[1])

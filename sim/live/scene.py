@@ -17,7 +17,6 @@ import viser
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from allocation.wrench_facets import WrenchFacets
-from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, skew
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.quaternion import multiply
@@ -46,8 +45,10 @@ _NEAR_N = 0.05
 _SPIN = 0.06
 #: First view: from behind to the right; direction from the target, and distances that show this radius [m].
 _VIEW, _SEEN_M, _FOV = np.array([-0.5, -0.85, 0.35]), 1.1, math.radians(45.0)
-#: The wall behind the board is drawn so far beyond its outline, and so thick [m]; paths lie before the face [m].
-_WALL_M, _THIN_M, _BEFORE_M = 0.8, 0.02, 0.004
+#: The wall behind the board is drawn so far beyond its outline [m]; paths lie before the face [m].
+_WALL_M, _BEFORE_M = 0.8, 0.004
+#: Cells of the wall, of a path, and of a curved board [-].
+_CELLS = 24
 
 
 def turned(quaternion: np.ndarray) -> np.ndarray:
@@ -55,43 +56,65 @@ def turned(quaternion: np.ndarray) -> np.ndarray:
     return FLIP_QUATERNION * quaternion
 
 
-def check_drawn(scene: Scene) -> None:
-    """Refuse a scene that the page does not draw.
+class Board:
+    """Board, wall and path of the strokes; on a curved wall the board is strips in tangent planes.
 
-    Raises:
-        ConfigError: When its wall is no upright plane.
+    Args:
+        server: viser's server.
+        scene: The truth.
     """
-    surface = scene.surface
-    if surface.kind != "plane" or surface.lean_deg:
-        shape = f"surface.kind = {surface.kind!r}, surface.lean_deg = {surface.lean_deg:g}"
-        raise ConfigError(f"{shape} is refused: live draws flat upright walls alone")
 
+    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
+        geometry, board = BoardGeometry(scene), scene.board
+        surface, self._scene, self._strips = geometry.surface, scene, list[viser.ImageHandle]()
 
-def draw_board(server: viser.ViserServer, scene: Scene) -> viser.ImageHandle:
-    """Board, wall and path of the strokes of a flat wall, see `check_drawn`.
+        def place(along: Any, up: Any, depth: float) -> np.ndarray:
+            spots = geometry.point(along, up)
+            return FLIP * surface.points(np.concatenate((np.full((*spots.shape[:-1], 1), depth), spots), axis=-1))
 
-    Returns:
-        The picture on the board, see `board_picture`.
-    """
-    geometry, board = BoardGeometry(scene), scene.board
-    axes = np.column_stack((FLIP * [0.0, *geometry.along], FLIP * [0.0, *-geometry.up], FLIP * [1.0, 0.0, 0.0]))
-    middle = FLIP * [0.0, *geometry.point(0.5 * board.width_m, 0.5 * board.height_m)]
-    turn = quaternion_of_axes(axes)
-    wall = (board.width_m + 2.0 * _WALL_M, board.height_m + 2.0 * _WALL_M, _THIN_M)
-    behind = middle + (board.gap_m + 0.5 * _THIN_M) * np.eye(3)[0]
-    server.scene.add_box("/wall", np.array(scene.wall.color), wall, wxyz=turn, position=behind)
-    server.scene.add_grid(
-        "/ground", 8.0, 8.0, plane="xy", position=(-3.0, float(middle[1]), 0.0), cell_size=0.5, shadow_opacity=0.2
-    )
-    ends, lines = geometry.stroke_ends, []
-    for stroke in range(1, geometry.strokes + 1):
-        spots = geometry.from_pattern(np.array([(u, geometry.stroke_place(stroke)) for u in ends]))
-        lines.append([FLIP * [-_BEFORE_M, *geometry.point(*spot)] for spot in spots])
-    server.scene.add_line_segments("/path", np.array(lines), _PATH, thickness=0.006)
-    picture = board_picture(scene, None)
-    return server.scene.add_image(
-        "/board", picture, board.width_m, board.height_m, wxyz=turn, position=middle, format="jpeg", jpeg_quality=80
-    )
+        ways = (np.linspace(-_WALL_M, size + _WALL_M, _CELLS + 1) for size in (board.width_m, board.height_m))
+        along, up = (each.ravel() for each in np.meshgrid(*ways))
+        corner = np.arange((_CELLS + 1) * _CELLS).reshape(_CELLS, _CELLS + 1)[:, :-1].ravel()
+        right, above = corner + 1, corner + _CELLS + 1
+        faces = np.concatenate((np.stack((corner, right, above), 1), np.stack((right, above + 1, above), 1)))
+        server.scene.add_mesh_simple(
+            "/wall", place(along, up, board.gap_m), faces, color=scene.wall.color, side="double", cast_shadow=False
+        )
+        ends, lines = np.linspace(*geometry.stroke_ends, _CELLS + 1), []
+        for stroke in range(1, geometry.strokes + 1):
+            spots = geometry.from_pattern(np.column_stack((ends, np.full(len(ends), geometry.stroke_place(stroke)))))
+            points = place(spots[:, 0], spots[:, 1], -_BEFORE_M)
+            lines.append(np.stack((points[:-1], points[1:]), 1))
+        server.scene.add_line_segments("/path", np.concatenate(lines), _PATH, thickness=0.006)
+        count = 1 if surface.flat else _CELLS
+        self._axis = 0 if scene.surface.axis == "level" else 1
+        share = (np.arange(count) + 0.5) / count
+        middle, size = np.full(count, 0.5), np.array([board.width_m, board.height_m])
+        shares = np.column_stack((share, middle) if self._axis else (middle, 1.0 - share))
+        size[1 - self._axis] /= count
+        for index, (picture, spot) in enumerate(zip(self._cut(None, count), shares, strict=True)):
+            chart = np.array([0.0, *geometry.point(spot[0] * board.width_m, spot[1] * board.height_m)])
+            axes = surface.axes(chart) @ np.array([[0.0, *geometry.along], [0.0, *-geometry.up], [1.0, 0.0, 0.0]]).T
+            self._strips.append(
+                server.scene.add_image(
+                    f"/board/{index}", picture, size[0], size[1], wxyz=quaternion_of_axes(FLIP[:, None] * axes),
+                    position=FLIP * surface.points(chart), format="jpeg", jpeg_quality=80,
+                )
+            )  # fmt: skip
+        ground = np.array([-3.0, geometry.point(0.5 * board.width_m, 0.0)[0], 0.0])
+        ground += (geometry.ground - geometry.down @ ground) * geometry.down
+        server.scene.add_grid(
+            "/ground", 8.0, 8.0, plane="xy", position=FLIP * ground, cell_size=0.5, shadow_opacity=0.2,
+            wxyz=quaternion_of_axes(FLIP[:, None] * geometry.from_ned * FLIP),
+        )  # fmt: skip
+
+    def show(self, painted: np.ndarray) -> None:
+        """Show the paint, see `board_picture`."""
+        for strip, picture in zip(self._strips, self._cut(painted, len(self._strips)), strict=True):
+            strip.image = picture
+
+    def _cut(self, painted: np.ndarray | None, count: int) -> list[np.ndarray]:
+        return np.array_split(board_picture(self._scene, painted), count, axis=self._axis)
 
 
 def board_picture(scene: Scene, painted: np.ndarray | None) -> np.ndarray:
@@ -152,10 +175,11 @@ class ReachPolytope:
 
     Args:
         vehicle: The vehicle flown.
+        down: Unit vector of gravity in the world, (3,).
     """
 
-    def __init__(self, vehicle: TrueVehicle) -> None:
-        self._vehicle, self._facets = vehicle, WrenchFacets(vehicle.geometry)
+    def __init__(self, vehicle: TrueVehicle, down: np.ndarray) -> None:
+        self._down, self._vehicle, self._facets = down, vehicle, WrenchFacets(vehicle.geometry)
         self._wrench = np.vstack((np.eye(3), skew(np.array(vehicle.tip_position_m))))
 
     def mesh(
@@ -163,7 +187,7 @@ class ReachPolytope:
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """Vertices [N], FRD, (v, 3), and faces (f, 3); None where not even hover is attainable."""
         vehicle = self._vehicle
-        down = rotation_from_quaternion(quaternion).T @ [0.0, 0.0, 1.0]
+        down = rotation_from_quaternion(quaternion).T @ self._down
         weight = np.concatenate((-vehicle.mass_kg * GRAVITY * down, np.zeros(3)))
         low, high = self._facets.rooms(weight, lower, upper)
         if low.max() >= 0.0 or high.min() <= 0.0:
@@ -189,10 +213,12 @@ class LiveScene:
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene, config: PilotConfig, seed: int) -> None:
-        self._server, self._scene = server, scene
-        server.scene.set_up_direction("+z")
+        self._server = server
+        self._geometry = BoardGeometry(scene)
+        self._upwards = FLIP * -self._geometry.down  # a leaning wall turns gravity, not the world
+        server.scene.set_up_direction(self._upwards)
         server.scene.configure_default_lights(cast_shadow=False)
-        self._board = draw_board(server, scene)
+        self._board = Board(server, scene)
         vehicle = true_vehicle(scene, config.controller.vehicle, seed)
         body, blades = vehicle_meshes(scene, vehicle)
         add = server.scene
@@ -219,7 +245,7 @@ class LiveScene:
         self._bar_colors, both = np.zeros(0, np.uint8), np.zeros((2, 2, 3))
         forces = np.array([_PUSH, _FRICTION], np.uint8)
         self._forces = add.add_arrows("/forces", both, forces, shaft_radius=0.008, head_radius=0.02, head_length=0.04)
-        self._reach_shape = ReachPolytope(vehicle)
+        self._reach_shape = ReachPolytope(vehicle, self._geometry.down)
         tip = FLIP * vehicle.tip_position_m
         self._reach = add.add_mesh_simple(
             "/vehicle/reach", np.zeros((3, 3)), np.zeros((1, 3), int), color=_REACH, opacity=0.18, side="double",
@@ -241,11 +267,11 @@ class LiveScene:
 
     def _view(self) -> None:
         """The first view: vehicle and board from the side, at any size of the window."""
-        tip = BoardGeometry(self._scene).start_tip
+        tip = self._geometry.surface.points(self._geometry.start_tip)
         target = FLIP * (-0.45, tip[1], tip[2]) + (0.0, 0.0, 0.1)
         self._target = target
         camera = self._server.initial_camera
-        camera.fov, camera.look_at, camera.up = _FOV, target, (0.0, 0.0, 1.0)
+        camera.fov, camera.look_at, camera.up = _FOV, target, self._upwards
         camera.position = target + _VIEW * (_SEEN_M / math.sin(0.5 * _FOV))
 
         self._server.on_client_connect(guarded(self.fit))
@@ -275,7 +301,7 @@ class LiveScene:
                 self._ghost.position = FLIP * ghost[places["position"]]
                 self._ghost.wxyz = turned(ghost[places["quaternion"]])
             if frame.get("paint") is not None:
-                self._board.image = board_picture(self._scene, frame["paint"])
+                self._board.show(frame["paint"])
             if frame.get("picture") is not None:
                 self._frustum.image = picture_of(frame["picture"])
                 self._polytope(part["quaternion"], *frame["limits"])
@@ -312,10 +338,12 @@ class LiveScene:
 
     def _arrows(self, part: dict[str, np.ndarray]) -> None:
         """Push of the tip on the wall, and friction of the wall on the tip."""
-        tip, friction = FLIP * part["tip"] + _ABOVE_M * np.eye(3)[2], FLIP * [0.0, *part["friction"]]
-        push = np.array([float(part["push"][0]), 0.0, 0.0])
+        surface, force = self._geometry.surface, float(part["push"][0])
+        axes = FLIP[:, None] * surface.axes(part["tip"])
+        tip, friction = FLIP * surface.points(part["tip"]) + _ABOVE_M * np.eye(3)[2], axes[:, 1:] @ part["friction"]
+        push = force * axes[:, 0]
         ends = [(tip - FORCE_M_N * push, tip), (tip, tip + FORCE_M_N * friction)]
-        if self._forces.visible != (shown := bool(push[0] > 0.0)):
+        if self._forces.visible != (shown := force > 0.0):
             self._forces.visible = shown
         if shown:
             self._forces.points = np.array(ends, np.float32)

@@ -75,11 +75,9 @@ def test_a_flight_that_dies_is_exit_code_1_and_one_line(serve):
         (["--replay", "nothing.json"], "nothing.json"),
         (["--log", "nothing.mcap"], "nothing.mcap"),
         (["--json"], "--json"),
-        (["--scene", "leaning.toml"], "lean_deg"),
     ],
 )
 def test_unusable_options_are_one_line(words, named, tmp_path):
-    (tmp_path / "leaning.toml").write_text("[surface]\nlean_deg = 5.0\n")
     command = [sys.executable, "-m", "sim.commands.cli", "live", "--no-open", *words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
     assert done.returncode == 2
