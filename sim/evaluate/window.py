@@ -53,7 +53,7 @@ def percentile(values: np.ndarray, percent: float) -> float:
 
 def tilt_deg(trace: Trace) -> np.ndarray:
     """Angle between the body's down axis and gravity [deg], (N,); exact near zero, where arccos is not."""
-    _, x, y, _ = multiply(BoardGeometry(trace.scene).attitude, trace.attitude.T)
+    _, x, y, _ = multiply(BoardGeometry(trace.scene).attitude.tolist(), list(trace.attitude.T))
     return np.degrees(2.0 * np.arcsin(np.clip(np.hypot(x, y), 0.0, 1.0)))
 
 

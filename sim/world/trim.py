@@ -53,4 +53,4 @@ def facing(
     arm = board.from_ned @ (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z)
     level = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
     tip = board.surface.points(board.start_tip + offset)
-    return tip - arm, np.array(multiply(conjugate(board.attitude), level))
+    return tip - arm, np.array(multiply(conjugate(board.attitude.tolist()), level))

@@ -123,4 +123,4 @@ class Surface(ABC):
             return position, quaternion
         tangent = self.attitude(place)
         moved = rotation_from_quaternion(tangent).T @ (position - self.points(place))
-        return moved + place, np.array(multiply(conjugate(tangent), quaternion))
+        return moved + place, np.array(multiply(conjugate(tangent.tolist()), quaternion.tolist()))
