@@ -52,7 +52,7 @@ def main() -> None:
         "--press",
         "300",
     ]
-    flight = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    flight = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)  # nosec B603
     assert flight.stdout is not None
     try:
         print(flight.stdout.readline().strip())

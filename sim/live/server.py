@@ -183,7 +183,8 @@ class LiveServer:
             self._panel.note(f"{folder} has no log: that of the save before is being flown")
             return
         command = [sys.executable, "-m", "sim.commands.cli", "live", "--replay", f"{folder}/session.json", "--out"]
-        self._log = subprocess.Popen([*command, f"{folder}/run"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command.append(f"{folder}/run")
+        self._log = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # nosec B603
         self._panel.saved.content = (
             f"`{folder}`: session.json ({changes} changes) and preset.toml. The log is being flown again from it ..."
         )
