@@ -87,7 +87,7 @@ class Board:
             lines.append(np.stack((points[:-1], points[1:]), 1))
         server.scene.add_line_segments("/path", np.concatenate(lines), _PATH, thickness=0.006)
         count = 1 if surface.flat else _CELLS
-        self._axis = 0 if scene.surface.axis == "level" else 1
+        self._axis = 0 if scene.surface.axis == "horizontal" else 1
         share = (np.arange(count) + 0.5) / count
         middle, size = np.full(count, 0.5), np.array([board.width_m, board.height_m])
         shares = np.column_stack((share, middle) if self._axis else (middle, 1.0 - share))

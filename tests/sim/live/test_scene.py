@@ -17,7 +17,7 @@ from sim.world.mujoco_frames import FLIP
 from sim.world.scene import Scene, SurfaceScene
 
 
-@pytest.mark.parametrize("axis", ["upright", "level"])
+@pytest.mark.parametrize("axis", ["vertical", "horizontal"])
 def test_the_strips_of_a_board_lie_on_the_wall_and_show_its_paint(free_port, axis):
     scene = dataclasses.replace(Scene(), surface=SurfaceScene(kind="cylinder", radius_m=2.0, lean_deg=5.0, axis=axis))
     server = open_server("127.0.0.1", free_port)
@@ -32,7 +32,7 @@ def test_the_strips_of_a_board_lie_on_the_wall_and_show_its_paint(free_port, axi
         paint[-1, 0] = 255  # bottom left
         board.show(paint)
         painted = [np.ptp(strip.image.astype(int), axis=(0, 1)).any() for strip in board._strips]
-        lowest = int(np.argmin(spots[:, 0 if axis == "upright" else 1]))
+        lowest = int(np.argmin(spots[:, 0 if axis == "vertical" else 1]))
         assert painted == [index == lowest for index in range(len(painted))]
     finally:
         stop(server)
