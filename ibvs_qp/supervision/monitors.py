@@ -65,6 +65,8 @@ MARGIN = 0.5
 #: A single rotor that gives at least this fraction of its thrust is weak, by its blades or its drive: its scale is
 #: changed. One that gives less is stuck or lost; so is one that its scale does not explain after so many changes.
 LEAST_SCALE, MOST_CHANGES = 0.5, 2
+#: A rotor that is commanded more than this multiple of the mean thrust may have reached a limit [-].
+HIGH = 1.25
 #: Least thrust in a ratio [N].
 LEAST_THRUST = 0.5
 #: Time after a change of the scale in which motors and filters settle [s]; changes this far apart count as new.
@@ -461,7 +463,8 @@ class RotorMonitor:
             if self._names[rotor] not in self._found and time_s - since < self._settings.missing_time_s:
                 continue
             loss = float(missing[rotor] / self._signatures[rotor, rotor])
-            if self._found or len(rotors) > 1 or not self._rescale(rotor, loss, float(thrusts[rotor]), time_s):
+            limit = float(thrusts[rotor]) > HIGH * float(thrusts.mean())  # a limit acts on high thrusts, a scale on all
+            if self._found or len(rotors) > 1 or limit or not self._rescale(rotor, loss, float(thrusts[rotor]), time_s):
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 
     def _settles(self, missing: np.ndarray, thrusts: np.ndarray) -> bool:

@@ -170,7 +170,7 @@ class Perception:
         picture = Picture(frame, layout, down)
         refused = self._surface.find_surface(picture, predicted, seed_pixel)
         plane = self._surface.plane
-        if plane is not None:
+        if plane is not None and self._config.curved:
             self._measure_curvature(frame, layout, plane, interval)
         picture.plane = None if plane is None else plane.abcd[:3]
         clock.lap("plane")
