@@ -271,12 +271,16 @@ class Model:
 
     @property
     def turning_lever(self) -> ca.SX:
-        """Mass times the tip's acceleration along n per angular acceleration [kg m], (3,).
+        r"""Mass times the acceleration along n per angular acceleration of a tip on a leaning wall [kg m], (3,).
 
-        It is zero for a level vehicle that faces a level wall with its tip at the height of the centre of mass.
+        .. math:: m (n^T d) (r \times d)
+
+        with the tip r and gravity's direction d. It is zero on an upright wall, however the vehicle tilts: a tilt that
+        the push bought there would grow with it, and few rotors may be left to take it back.
         """
-        vehicle = self.config.vehicle
-        return vehicle.mass_kg * ca.cross(ca.DM(vehicle.tip_position_m), self.normal)
+        vehicle, down = self.config.vehicle, self.body.down
+        lean = ca.dot(self.wall.normal, down)
+        return vehicle.mass_kg * lean * ca.cross(ca.DM(vehicle.tip_position_m), down)
 
     @property
     def body_rotation_gain(self) -> ca.SX:

@@ -55,7 +55,7 @@ MOST_ROTORS = 2
 FOUND, FOUND_SIGMAS = 1.5, 3.0
 #: A rotor that misses this fraction of its thrust, while the others miss some too, has reached a limit [-].
 WEAK = 0.25
-#: As many faulty rotors have a common cause, a limit: they follow below it, and none gives too much.
+#: As many faulty rotors have a common cause, a limit of all: they follow below it, and none gives too much.
 COMMON = 3
 #: A ceiling with a common cause rises at this rate while no thrust is missing [N/s]: one found while the thrusts change
 #: fast is too low to hover with.
@@ -527,6 +527,11 @@ class RotorMonitor:
         upper[rotor] = actual if loss > 0.0 else min(actual + MARGIN, float(self._box[1][rotor]))
         self.limits, self._found[self._names[rotor]] = (lower, upper), actual
         (self._strong.add if loss <= 0.0 else self._strong.discard)(rotor)
+        if self.scale[rotor] != 1.0:  # the limit explains the thrust that the scale was for
+            self.scale = self.scale.copy()
+            self.scale[rotor] = 1.0
         if len(self._found) >= COMMON:
-            lower[:], free = self._box[0], list(self._strong)
-            upper[free] = self._box[1][free]
+            # One limit for all: two rotors that keep theirs would leave the others thrusts that they cannot give.
+            lower[:], found = self._box[0], [self._names.index(name) for name in self._found]
+            if weak := set(found) - self._strong:
+                upper[:] = np.minimum(upper[list(weak)].max(), self._box[1])

@@ -15,6 +15,7 @@ from controller_scenes import (
     attitude,
     line_references,
     measured,
+    moved_by_turn,
     random_tick,
     without_rotors,
 )
@@ -41,7 +42,7 @@ MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 def terms_of(seed: int, lines: int, weight: float, config: ControllerConfig = CONFIG) -> Setpoints:
     setpoints = analytic_setpoints(config)
-    setpoints.update(*random_tick(np.random.default_rng(seed), lines))
+    setpoints.update(*random_tick(np.random.default_rng(seed), lines, lean=0.2 * (seed % 2)))
     setpoints.step.inputs["contact_weight"][0] = weight
     evaluate_law(setpoints)
     return setpoints
@@ -80,7 +81,7 @@ def test_the_wrench_is_the_law_by_hand(lines: int, weight: float) -> None:
             inverse = np.linalg.pinv(matrix, rcond=0.05)
             acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
         servo = MASSES * acceleration
-        tip = MASSES[:3] * (acceleration[:3] + np.cross(acceleration[3:], CONFIG.vehicle.tip_position_m))
+        tip = MASSES[:3] * (acceleration[:3] + moved_by_turn(setpoints, acceleration[3:]))
         selection = weight * np.outer(normal, normal)
         force = normal * setpoints.push_command
         expected = servo + np.concatenate((selection @ (force - tip), np.zeros(3)))
@@ -91,9 +92,8 @@ def test_full_contact_keeps_the_force_command() -> None:
     """Lambda' = lambda n n^T: along n the push alone accelerates the tip. The printed R diag(0,0,lambda) cancels it."""
     for seed in range(10):
         setpoints = terms_of(seed, 2, 1.0)
-        wrench, tip = analytic_wrench(setpoints), CONFIG.vehicle.tip_position_m
-        turning = MASS * np.cross(wrench[3:] / MASSES[3:], tip)
-        along = setpoints.normal @ (wrench[:3] + turning)
+        wrench = analytic_wrench(setpoints)
+        along = setpoints.normal @ (wrench[:3] + MASS * moved_by_turn(setpoints, wrench[3:] / MASSES[3:]))
         assert along == pytest.approx(setpoints.push_command, abs=1e-9)
         none = terms_of(seed, 0, 0.0)
         assert none.normal @ analytic_wrench(none)[:3] == pytest.approx(none.standoff_command, abs=1e-9)

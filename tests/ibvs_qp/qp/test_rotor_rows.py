@@ -214,11 +214,6 @@ def thrusts_moved(controller: HybridController, moved: dict[str, float]) -> tupl
     return before + (1.0 - np.exp(-TICK_S / lag)) * (last - before), last
 
 
-def _of_tip(controller: HybridController, acceleration: np.ndarray) -> np.ndarray:
-    """Acceleration of the tip (3,), by that of the vehicle (6,); the vehicle hardly turns."""
-    return acceleration[:3] + np.cross(acceleration[3:], controller.config.vehicle.tip_position_m)
-
-
 def regulated(
     controller: HybridController,
     quaternion: np.ndarray,
@@ -249,9 +244,8 @@ def regulated(
         penetration[0] + TICK_S * rate_now,
         rate_now,
         wall.normal @ given[:3],
-        _of_tip(controller, gone) @ wall.normal,
+        wall.normal @ gone[:3],
     )
-    normal += wall.normal @ (_of_tip(controller, wanted) - wanted[:3])  # the push accelerates the tip, turns included
     wanted[:3] = right * wall.right + down * wall.down - normal * wall.normal
     if not setpoints.lines:
         return wanted
