@@ -64,9 +64,7 @@ RISE_N_S = 2.0
 MARGIN = 0.5
 #: A single rotor that gives at least this fraction of its thrust is weak, by its blades or its drive: its scale is
 #: changed. One that gives less is stuck or lost; so is one that its scale does not explain after so many changes.
-LEAST_SCALE, MOST_CHANGES = 0.5, 2
-#: A rotor that is commanded more than this multiple of the mean thrust may have reached a limit [-].
-HIGH = 1.25
+LEAST_SCALE, MOST_CHANGES = 0.6, 2
 #: Least thrust in a ratio [N].
 LEAST_THRUST = 0.5
 #: Time after a change of the scale in which motors and filters settle [s]; changes this far apart count as new.
@@ -457,14 +455,18 @@ class RotorMonitor:
         # While one rotor is followed, its remaining deficit must not be ascribed to a pair.
         rotors = self._explain(missing, 1 if len(self._found) == 1 else MOST_ROTORS)
         self._suspects = {rotor: self._suspects.get(rotor, time_s) for rotor in rotors}
-        for rotor, since in list(self._suspects.items()):
-            # A rotor joins those found once it was suspected itself for long enough: while thrusts are shared out
-            # anew, others miss some for a tick.
-            if self._names[rotor] not in self._found and time_s - since < self._settings.missing_time_s:
-                continue
+        # A rotor joins those found once it was suspected itself for long enough: while thrusts are shared out anew,
+        # others miss some for a tick.
+        least = self._settings.missing_time_s
+        sure = [
+            rotor
+            for rotor, since in self._suspects.items()
+            if self._names[rotor] in self._found or time_s - since >= least
+        ]
+        for rotor in sure:
             loss = float(missing[rotor] / self._signatures[rotor, rotor])
-            limit = float(thrusts[rotor]) > HIGH * float(thrusts.mean())  # a limit acts on high thrusts, a scale on all
-            if self._found or len(rotors) > 1 or limit or not self._rescale(rotor, loss, float(thrusts[rotor]), time_s):
+            alone = len(sure) == 1 and not self._found
+            if not (alone and self._rescale(rotor, loss, float(thrusts[rotor]), time_s)):
                 self._limit(rotor, float(thrusts[rotor]) - loss, loss)
 
     def _settles(self, missing: np.ndarray, thrusts: np.ndarray) -> bool:
