@@ -1,4 +1,4 @@
-"""Load of ``ibvs-qp live``: headless clients that read everything; frames per second of each, and late ticks.
+"""Load of ``ibvs-qp live``: headless clients that read everything; frames per second of each, late ticks, cores used.
 
 Example: python benchmarks/live.py --clients 10 --seconds 30
 """
@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import os
 import signal
 import subprocess
 import sys
+import time
 
+import psutil
 import viser
 import websockets
 
@@ -30,7 +33,14 @@ async def _read(port: int, seconds: float) -> float:
     return count / seconds
 
 
+def _used_s(parts: dict[str, psutil.Process]) -> dict[str, float]:
+    """Processor time of each process so far [s]."""
+    return {name: sum(process.cpu_times()[:2]) for name, process in parts.items()}
+
+
 async def _all(port: int, clients: int, seconds: float) -> list[float]:
+    if not clients:
+        await asyncio.sleep(seconds)
     return await asyncio.gather(*(_read(port, seconds) for _ in range(clients)))
 
 
@@ -56,8 +66,17 @@ def main() -> None:
     assert flight.stdout is not None
     try:
         print(flight.stdout.readline().strip())
+        server, children = psutil.Process(flight.pid), psutil.Process(flight.pid).children()
+        fly = next(each for each in children if "spawn_main" in " ".join(each.cmdline()))
+        parts = {"flight": fly, "server": server, "clients": psutil.Process()}
+        before, began = _used_s(parts), time.monotonic()
         rates = asyncio.run(_all(given.port, given.clients, given.seconds))
-        print(f"frames/s of {len(rates)} clients: {min(rates):.1f} to {max(rates):.1f}")
+        took = time.monotonic() - began
+        if rates:
+            print(f"frames/s of {len(rates)} clients: {min(rates):.1f} to {max(rates):.1f}")
+        cores = {name: (used - before[name]) / took for name, used in _used_s(parts).items()}
+        load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+        print("cores used:", ", ".join(f"{name} {each:.2f}" for name, each in cores.items()), f"({load})")
         flight.send_signal(signal.SIGTERM)
         print(flight.communicate(timeout=30)[0].strip())
     finally:

@@ -8,11 +8,13 @@ with app.setup:
 
     import marimo as mo
 
+    from ibvs_qp.config.errors import ConfigError
     from sim.notebook.dashboard import draw_dashboard
     from sim.notebook.knobs import GROUPS, KNOBS, knob_values
     from sim.notebook.picture import picture
     from sim.notebook.tuning import Start, TuningBench, compare_pair, load_setting, load_start, save_setting, save_text
     from sim.notebook.wall_flights import Setting, flights_table, fly_setting
+    from sim.notebook.what_if import LiveFlight, RecordedTicks
 
     FIGURES = (
         "first touch [s]",
@@ -32,41 +34,9 @@ def _():
     mo.md(r"""
     # Tuning by constraints
 
-    Every tick, 250 times a second, the controller solves one small quadratic program for the six rotor thrusts $u \in
-    \mathbb{R}^6$ and the slacks $s \ge 0$ of its soft limits:
-
-    $$
-    \min_{u,\,s}\;\; \tfrac12 \sum_k w_k \,\bigl\| A_k\,\dot\nu(u) - b_k \bigr\|^2 \;+\; \tfrac12 \sum_j p_j\, s_j^2
-    \qquad \text{with} \qquad
-    \dot\nu(u) = M^{-1}\,(B\,u + h),
-    $$
-
-    $$
-    \max(u_\text{min},\; u^- - \dot u_\text{max}\,\Delta t) \;\le\; u \;\le\;
-    \min(u_\text{max},\; u^- + \dot u_\text{max}\,\Delta t),
-    \qquad
-    c_j^\top \dot\nu(u) \;\le\; d_j + s_j .
-    $$
-
-    $\dot\nu$ is the linear and angular acceleration of the vehicle, $B$ the control effectiveness of the tilted
-    rotors, $h$ the wrench of gravity, contact and other known effects, and $u^-$ the thrusts of the tick before. The
-    tasks $k$ are image lines, push, level attitude, yaw, free velocity and height. OSQP solves the program at every
-    tick. There are three kinds of parameters:
-
-    * a **weight** $w_k$ is the inverse square of an acceptable error. Weights have no effect while all tasks can be
-      met together. Otherwise they decide which task deviates;
-    * a **hard limit** (thrust, thrust rate) always holds. Its **multiplier** $|\partial J^\star / \partial
-      u_\text{max}|$ is the derivative of the least cost by the bound, and no more: it falls linearly as the bound
-      yields, to zero where the limit is released. If nothing else changes on the way, the cost falls by half of
-      multiplier times way. `ibvs-qp explain` prints the range and the true fall;
-    * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
-      $p_j$ allows violations.
-
-    The controls are in the sidebar. On release of a control the closed loop flies again, once with the last values if
-    several controls were moved meanwhile; *reset all* goes back to the preset, *load* begins with another one. The
-    vehicle starts 15 cm in front of the board, approaches, presses for 1.6 s and slides to the left along the board's
-    lower edge. Plant, contact, sensors with noise and delays, estimators and strategy are those of `ibvs-qp paint`; a
-    sensor model of lines replaces the camera (`--features geometric`).
+    **One tick again.** A weight or a bound in a recorded tick is scaled and its program solved again; the vehicle does
+    not move. `thrust_ceiling` is the upper limit of all rotors: at a quarter of it, −0.6 decades, some rotors are at
+    their limit in the press, and the limits have prices. At 0 decades the tick is as it was flown.
     """)
     return
 
@@ -124,16 +94,54 @@ def _(controls, load, refusal, reset, share_gains, start, wanted):
     return
 
 
-@app.cell
-def _(bench, share_gains, turns):
-    comparison = bench.compare(turns(), own_gains=not share_gains.value)
-    return (comparison,)
+@app.cell(hide_code=True)
+def _(bench):
+    ticks = RecordedTicks(fly_setting(bench.base))
+    instead = mo.ui.dropdown(ticks.names, value="thrust_ceiling", label="instead")
+    decades = mo.ui.slider(-2.0, 2.0, 0.02, value=-0.6, label="factor, in decades", show_value=True)
+    moment = mo.ui.slider(
+        0.0, round(ticks.end_s, 2), 0.02, value=round(ticks.hold_s, 2), label="t [s]", show_value=True
+    )
+    live = mo.ui.run_button(label="fly the sidebar's setting live")
+    mo.hstack([instead, decades, moment, live], justify="start", gap=2, wrap=True)
+    return decades, instead, live, moment, ticks
 
 
-@app.cell
-def _(comparison):
-    picture(draw_dashboard, comparison)
+@app.cell(hide_code=True)
+def _(bench, live, live_flight):
+    mo.stop(not live.value)
+    with mo.status.spinner("Starting ibvs-qp live: 10 s ..."):
+        try:
+            _text = live_flight.start(bench.setting)
+        except ConfigError as _error:
+            _text = f"**Not flown:** {_error}"
+    mo.md(_text)
     return
+
+
+@app.cell(hide_code=True)
+def _(decades, instead, moment, ticks):
+    _drawn, explained = ticks.show(moment.value, instead.value, 10.0**decades.value)
+    mo.Html(_drawn)
+    return (explained,)
+
+
+@app.cell(hide_code=True)
+def _():
+    live_flight = LiveFlight()
+    shown = []  # the last figure, which stays until its successor is drawn
+    return live_flight, shown
+
+
+@app.cell
+def _(bench, share_gains, shown, turns):
+    def _note(text):
+        mo.output.replace(mo.vstack([mo.md(text), *shown]))
+
+    comparison = bench.compare(turns(), own_gains=not share_gains.value, note=_note)
+    shown[:] = [picture(draw_dashboard, comparison)]
+    shown[0]
+    return (comparison,)
 
 
 @app.cell(hide_code=True)
@@ -145,6 +153,56 @@ def _(comparison):
 @app.cell(hide_code=True)
 def _(comparison):
     mo.md(flights_table(comparison.flights, FIGURES))
+    return
+
+
+@app.cell(hide_code=True)
+def _(explained):
+    mo.md(f"**The tick above in numbers.** {explained}")
+    return
+
+
+@app.cell(hide_code=True)
+def _():
+    mo.md(r"""
+    ## The program
+
+    Every tick, 250 times a second, the controller solves one small quadratic program for the six rotor thrusts $u \in
+    \mathbb{R}^6$ and the slacks $s \ge 0$ of its soft limits:
+
+    $$
+    \min_{u,\,s}\;\; \tfrac12 \sum_k w_k \,\bigl\| A_k\,\dot\nu(u) - b_k \bigr\|^2 \;+\; \tfrac12 \sum_j p_j\, s_j^2
+    \qquad \text{with} \qquad
+    \dot\nu(u) = M^{-1}\,(B\,u + h),
+    $$
+
+    $$
+    \max(u_\text{min},\; u^- - \dot u_\text{max}\,\Delta t) \;\le\; u \;\le\;
+    \min(u_\text{max},\; u^- + \dot u_\text{max}\,\Delta t),
+    \qquad
+    c_j^\top \dot\nu(u) \;\le\; d_j + s_j .
+    $$
+
+    $\dot\nu$ is the linear and angular acceleration of the vehicle, $B$ the control effectiveness of the tilted
+    rotors, $h$ the wrench of gravity, contact and other known effects, and $u^-$ the thrusts of the tick before. The
+    tasks $k$ are image lines, push, level attitude, yaw, free velocity and height. OSQP solves the program at every
+    tick. There are three kinds of parameters:
+
+    * a **weight** $w_k$ is the inverse square of an acceptable error. Weights have no effect while all tasks can be
+      met together. Otherwise they decide which task deviates;
+    * a **hard limit** (thrust, thrust rate) always holds. Its **multiplier** $|\partial J^\star / \partial
+      u_\text{max}|$ is the derivative of the least cost by the bound, and no more: it falls linearly as the bound
+      yields, to zero where the limit is released. If nothing else changes on the way, the cost falls by half of
+      multiplier times way. `ibvs-qp explain` prints the range and the true fall;
+    * a **soft limit** has a slack $s_j$ with the **slack weight** $p_j$: a large $p_j$ is nearly a hard limit, a small
+      $p_j$ allows violations.
+
+    The controls of the flight are in the sidebar. On release of a control the closed loop flies again, once with the
+    last values if several controls were moved meanwhile; *reset all* goes back to the preset, *load* begins with
+    another one. The vehicle starts 15 cm in front of the board, approaches, presses for 1.6 s and slides to the left
+    along the board's lower edge. Plant, contact, sensors with noise and delays, estimators and strategy are those of
+    `ibvs-qp paint`; a sensor model of lines replaces the camera (`--features geometric`).
+    """)
     return
 
 
@@ -312,7 +370,7 @@ def _():
 
 
 @app.cell
-def _(at_the_limit, bench, comparison, controls):
+def _(at_the_limit, bench, comparison, controls, ticks):
     def test_sliders_begin_at_the_shipped_preset():
         assert {name: control.value for name, control in controls.items()} == knob_values(Setting())
         assert comparison.changes == () and not comparison.refusal
@@ -325,6 +383,12 @@ def _(at_the_limit, bench, comparison, controls):
             assert again == at_the_limit.setting
             assert (fly_setting(again).thrusts == at_the_limit.now.thrusts).all()
             assert f"ibvs-qp paint --preset {file} --scene {folder}/saved.scene.toml --seed 0" in save_text(again, file)
+
+    def test_a_lower_thrust_limit_has_a_price_and_both_are_drawn():
+        drawn, text = ticks.show(ticks.hold_s, "thrust_ceiling", 0.25)
+        assert "holds for changes of" in text and drawn.count("<svg") == 2
+        assert "No limit is active" in ticks.show(ticks.hold_s, "thrust_ceiling", 1.0)[1]
+        assert "No thrusts satisfy" in ticks.show(ticks.hold_s, "thrust_ceiling", 0.01)[1]
 
     def test_active_limits_have_a_multiplier():
         flown = at_the_limit.now

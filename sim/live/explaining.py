@@ -11,7 +11,7 @@ import numpy as np
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import ConfigError, out_of_range
 from ibvs_qp.controller import qp_problem
-from ibvs_qp.model.inputs import RUN_TIME, equations
+from ibvs_qp.model.inputs import RUN_TIME, equations, setting_values
 from ibvs_qp.qp.explain import Explanation, TickReplay
 from ibvs_qp.qp.problem import QpProblem
 from ibvs_qp.symbolic.signals import places
@@ -34,6 +34,10 @@ def _problem(config: ControllerConfig) -> QpProblem:
 class WhatIf:
     """Solves recorded ticks of one flight, as recorded and with other settings.
 
+    Attributes:
+        rotors: Names of the rotors.
+        names: What `scaled` changes: the ceiling of thrusts, weights, and limits but their switches.
+
     Args:
         config: The controller flown; only its structure matters, weights and bounds are inputs of a tick.
     """
@@ -43,6 +47,8 @@ class WhatIf:
         self._replay, self._replaying = TickReplay(self._problem), threading.Lock()  # it has one buffer
         self._places = places(self._problem.model.signals.inputs)
         self.rotors = self._problem.model.config.vehicle.geometry.names
+        numbers = (name for name, value in setting_values(config).items() if not isinstance(value, bool))
+        self.names = (CEILING, *(name for name in numbers if name.startswith(("weights.", "limits."))))
 
     def settings(self, point: np.ndarray) -> dict[str, float]:
         """Gains, weights and limits in a recorded tick, by their names."""
@@ -72,6 +78,21 @@ class WhatIf:
             changed[self._places[name]] = value
         with self._replaying:
             return self._replay.explain(changed)
+
+    def scaled(
+        self, point: np.ndarray, name: str, factor: float
+    ) -> tuple[float, Explanation | None, Explanation | None]:
+        """Solve a recorded tick as recorded, and with one setting of `names` times a factor.
+
+        Returns:
+            The setting's value, and both explanations; None without a solution.
+
+        Raises:
+            ConfigError: When the value is refused.
+        """
+        flown = self.explain(point)
+        own = self.ceiling(point) if name == CEILING else self.settings(point)[name]
+        return factor * own, flown, flown if factor == 1.0 else self.explain(point, {name: factor * own})
 
 
 def markdown(found: Explanation | None, before: Explanation | None, rotors: tuple[str, ...]) -> str:

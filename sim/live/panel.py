@@ -19,7 +19,7 @@ from ibvs_qp.config.solver import SOLVERS, SolverSettings
 from ibvs_qp.model.inputs import RUN_TIME
 from ibvs_qp.pilot.painting.config import PaintingConfig
 from sim.live.disturbances import BUTTONS, faults
-from sim.live.explaining import CEILING, WhatIf, markdown
+from sim.live.explaining import WhatIf, markdown
 from sim.live.process import FASTEST, SLOWEST
 from sim.live.rows import KEPT_S
 from sim.live.site import guarded
@@ -283,9 +283,7 @@ class Panel:
         self._button(
             "Explain the tick", lambda: self._send("point", self._cursor()), "The tick that the slider back points at."
         )
-        names = tuple(name for name in self._settings if name.startswith(("weights.", "limits.")))
-        names = tuple(name for name in names if not isinstance(self._settings[name], bool))
-        self._what = gui.add_dropdown("instead", (CEILING, *names), initial_value="weights.push")
+        self._what = gui.add_dropdown("instead", self._what_if.names, initial_value="weights.push")
         self._factor = gui.add_slider(
             "factor x 1", -_WHAT_IF_DECADES, _WHAT_IF_DECADES, 0.02, 0.0, hint="On its value at that tick, in decades."
         )
@@ -305,12 +303,9 @@ class Panel:
             return
         factor, name = 10.0**self._factor.value, self._what.value
         self._factor.label = f"factor x {factor:.3g}"
-        flown = self._what_if.explain(self._point)
-        own = self._what_if.settings(self._point)
-        value = factor * (own[name] if name != CEILING else self._what_if.ceiling(self._point))
         head = f"**Tick {self._tick}, t = {(self._tick or 0) * self.tick_s:.3f} s**"
         try:
-            now = flown if self._factor.value == 0.0 else self._what_if.explain(self._point, {name: value})
+            value, flown, now = self._what_if.scaled(self._point, name, factor)
             head += "" if now is flown else f", {name} = {value:.4g}"
             self._text.content = head + "\n\n" + markdown(now, flown, self._what_if.rotors)
         except IbvsQpError as error:

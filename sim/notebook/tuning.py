@@ -103,12 +103,23 @@ class TuningBench:
         self.base = base or Setting()
         self._shown: Comparison | None = None
 
-    def compare(self, values: dict[str, Any] | None = None, own_gains: bool = True) -> Comparison:
+    @property
+    def setting(self) -> Setting:
+        """The setting flown last."""
+        return self._shown.setting if self._shown is not None else self.base
+
+    def compare(
+        self,
+        values: dict[str, Any] | None = None,
+        own_gains: bool = True,
+        note: Callable[[str], object] = lambda _: None,
+    ) -> Comparison:
         """Fly the base setting with other values of some knobs, by name.
 
         Args:
             values: Values of knobs.
             own_gains: The analytic law uses the gains of its own preset; otherwise those of the setting.
+            note: Called with what is being flown.
 
         Returns:
             The comparison; the one before, with a refusal, when the configuration is refused.
@@ -116,7 +127,10 @@ class TuningBench:
         shown = self._shown
         try:
             setting = turned(self.base, values or {})
-            now, analytic = fly_setting(setting), fly_setting(analytic_setting(setting, own_gains))
+            note("Flight 1 of 2: the QP law ...")
+            now = fly_setting(setting)
+            note("Flight 2 of 2: the analytic law ...")
+            analytic = fly_setting(analytic_setting(setting, own_gains))
         except ConfigError as error:
             return dataclasses.replace(shown or self.compare(), refusal=str(error))
         if shown is None:
