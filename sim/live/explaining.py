@@ -35,6 +35,7 @@ class WhatIf:
     """Solves recorded ticks of one flight, as recorded and with other settings.
 
     Attributes:
+        vehicle: The vehicle.
         rotors: Names of the rotors.
         names: What `scaled` changes: the ceiling of thrusts, weights, and limits but their switches.
 
@@ -46,7 +47,8 @@ class WhatIf:
         self._problem = _problem(equations(config))
         self._replay, self._replaying = TickReplay(self._problem), threading.Lock()  # it has one buffer
         self._places = places(self._problem.model.signals.inputs)
-        self.rotors = self._problem.model.config.vehicle.geometry.names
+        self.vehicle = self._problem.model.config.vehicle
+        self.rotors = self.vehicle.geometry.names
         numbers = (name for name, value in setting_values(config).items() if not isinstance(value, bool))
         self.names = (CEILING, *(name for name in numbers if name.startswith(("weights.", "limits."))))
 

@@ -16,12 +16,14 @@ from ibvs_qp.config.errors import IbvsQpError, out_of_range
 from ibvs_qp.config.gains import Gains, Weights
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.solver import SOLVERS, SolverSettings
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.inputs import RUN_TIME
 from ibvs_qp.pilot.painting.config import PaintingConfig
 from sim.live.disturbances import BUTTONS, faults
 from sim.live.explaining import WhatIf, markdown
 from sim.live.process import FASTEST, SLOWEST
 from sim.live.rows import KEPT_S
+from sim.live.session import CEILING, ceilings
 from sim.live.site import guarded
 
 #: Sections in the panel: title, class, and names of the fields.
@@ -59,15 +61,30 @@ def _check(handle: Any) -> None:
 
 
 class Control:
-    """A slider, switch or choice of one setting; a wide positive range is in decades, its label shows the value."""
+    """A slider, switch or choice of one setting; a wide positive range is in decades, its label shows the value.
 
-    def __init__(self, gui: viser.GuiApi, name: str, field: dataclasses.Field[Any], value: Any) -> None:
+    Args:
+        gui: Where it is added.
+        name: Of the setting.
+        field: Of the setting.
+        value: At the beginning.
+        span: Range, where it is narrower than that of the field.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        name: str,
+        field: dataclasses.Field[Any],
+        value: Any,
+        span: tuple[float, float] | None = None,
+    ) -> None:
         meta, self.name = field.metadata, name
         unit = f" [{meta['unit']}]" if meta["unit"] else ""
         self._label = f"{field.name.removesuffix('_n').removesuffix('_m_s').replace('_', ' ')}{unit}"
         why = f" Why: {meta['why']}." if meta.get("why") else ""
         hint = f"{name}{unit}: {meta['doc']}.{why}"
-        low, high = meta.get("low", -math.inf), meta.get("high", math.inf)
+        low, high = span or (meta.get("low", -math.inf), meta.get("high", math.inf))
         ranged = not isinstance(value, bool) and 0.0 <= low < high < math.inf
         self._low, self._least = low, low if low > 0.0 or not ranged else high * 10.0**-_RANGE
         self._decades = ranged and high / self._least >= _DECADES_FROM and (low > 0.0 or high >= _DECADES_FROM)
@@ -248,6 +265,8 @@ class Panel:
         with gui.add_folder("Task"):
             for name in _TASK:
                 self._add("task", name, name, fields[name])
+            field = next(each for each in dataclasses.fields(VehicleParams) if each.name == CEILING)
+            self._add("thrust", CEILING, CEILING, field, ceilings(self._what_if.vehicle))
             solver = next(field for field in dataclasses.fields(SolverSettings) if field.name == "name")
             self._solver = gui.add_dropdown(
                 "solver", SOLVERS, initial_value=self._settings["solver.name"], hint=solver.metadata["doc"]
@@ -259,8 +278,10 @@ class Panel:
                 for name in RUN_TIME[section]:
                     self._add("set", f"{section}.{name}", f"{section}.{name}", fields[name])
 
-    def _add(self, kind: str, name: str, key: str, field: dataclasses.Field[Any]) -> None:
-        control = self._controls[name] = Control(self._server.gui, name, field, self._settings[name])
+    def _add(
+        self, kind: str, name: str, key: str, field: dataclasses.Field[Any], span: tuple[float, float] | None = None
+    ) -> None:
+        control = self._controls[name] = Control(self._server.gui, name, field, self._settings[name], span)
         self._input(control.handle, lambda: self._change(kind, {key: control.value}))
 
     def _change(self, kind: str, values: dict[str, Any]) -> None:

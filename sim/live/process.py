@@ -21,7 +21,7 @@ from ibvs_qp.model.inputs import setting_values
 from sim.live.camera_picture import packed_picture
 from sim.live.presets import changes_text
 from sim.live.rows import LiveLoop
-from sim.live.session import Session
+from sim.live.session import CEILING, Session
 from sim.live.session_file import Start
 from sim.storage.atomic import write_text
 
@@ -172,6 +172,7 @@ class FlightProcess:
     def _settings(self) -> dict[str, Any]:
         pilot = self._loop.pilot
         task = {name: getattr(pilot.painter.config, name) for name in ("push_n", "speed_m_s")}
+        task |= {CEILING: float(self._loop.world.plant.thrust_limits[1].max())}
         return dict(setting_values(self._law_config())) | task | {"solver.name": self.session.qp.solver}
 
     def _law_config(self) -> ControllerConfig:

@@ -8,11 +8,15 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from ibvs_qp.config.errors import ConfigError, shown
+import numpy as np
+
+from ibvs_qp.config.errors import ConfigError, out_of_range, shown
 from ibvs_qp.config.settings import adjusted, from_dict
 from ibvs_qp.config.solver import SOLVERS
+from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
 from ibvs_qp.flight_state import FlightState
+from ibvs_qp.frames import GRAVITY
 from ibvs_qp.qp.problem import ProgramData
 from sim.faults.kinds import KINDS
 from sim.faults.rotors import RotorFault
@@ -29,6 +33,13 @@ SNAPSHOT_S = 1.0
 SNAPSHOTS = round(KEPT_S / SNAPSHOT_S) + 1
 #: Settings of a "task" change.
 TASK = ("push_n", "speed_m_s")
+#: Setting of a "thrust" change: upper limit of all rotors [N]; limits that differ by less are equal [N].
+CEILING, ROUNDING_N = "thrust_max_n", 1e-9
+
+
+def ceilings(vehicle: VehicleParams) -> tuple[float, float]:
+    """Smallest and largest upper thrust limit of a session [N]: the mean thrust of a hover, and full thrust."""
+    return vehicle.mass_kg * GRAVITY / vehicle.geometry.count, float(vehicle.thrust_max.max())
 
 
 @dataclass
@@ -104,6 +115,8 @@ class Flight:
                 raise ConfigError(f"{', '.join(sorted(wrong))}: not one of {', '.join(TASK)}")
             adjusted(pilot.config, "painting", values)
             pilot.painter.adjust(**values)
+        elif change.kind == "thrust":
+            self._limit_thrusts(values)
         elif change.kind == "fault":
             own = dict(values)
             kind = own.pop("kind", None)
@@ -115,6 +128,19 @@ class Flight:
             self.loop.disturb(dataclasses.replace(fault, after="start", delay_s=0.0))
         else:
             raise ConfigError(f"unknown kind of change {change.kind!r}")
+
+    def _limit_thrusts(self, values: dict[str, Any]) -> None:
+        """Upper thrust limit of rotor and controller; a lost or weak rotor keeps its own, lower one."""
+        plant, vehicle, limit = self.loop.world.plant, self.loop.pilot.config.controller.vehicle, values.get(CEILING)
+        if values.keys() != {CEILING} or isinstance(limit, bool) or not isinstance(limit, (int, float)):
+            raise ConfigError(f"a change of kind 'thrust' has one number, {CEILING}, not {shown(values)}")
+        least, most = ceilings(vehicle)
+        if not least <= limit <= most:  # nor NaN
+            raise out_of_range(CEILING, limit, "N", f"allowed is {least:.4g} to {most:.4g} N")
+        (lower, upper), own = plant.thrust_limits, plant.vehicle.thrust_max
+        sound = upper >= np.minimum(own, upper.max()) - ROUNDING_N
+        plant.thrust_limits = lower, np.minimum(np.where(sound, own, upper), limit)
+        self.loop.pilot.thrust_limits = plant.thrust_limits
 
     def rewind(self, tick: int) -> int:
         """Continue from the newest snapshot up to a tick; returns its tick, which may be earlier."""

@@ -54,7 +54,7 @@ class Change:
 
     Attributes:
         tick: Ticks flown before it.
-        kind: "set" (gains, weights, limits, solver), "task" (push, speed) or "fault".
+        kind: "set" (gains, weights, limits, solver), "task" (push, speed), "thrust" (upper limit) or "fault".
         values: Names and values.
     """
 

@@ -24,7 +24,12 @@ def page(free_port):
     config, sent, shown = ibvs_qp.preset("qp").controller, [], {}
     server = open_server("127.0.0.1", free_port)
     try:
-        settings = dict(setting_values(config)) | {"push_n": 5.0, "speed_m_s": 0.1, "solver.name": "osqp"}
+        settings = dict(setting_values(config)) | {
+            "push_n": 5.0,
+            "speed_m_s": 0.1,
+            "thrust_max_n": 52.56,
+            "solver.name": "osqp",
+        }
         panel = Panel(
             server, lambda *values: sent.append(values), settings, WhatIf(config), lambda: None, shown.__setitem__
         )
@@ -56,6 +61,7 @@ def enter(handle, value, client: int) -> None:
         ("analytic law", False, None),
         ("push =", 0.0, 1e6),
         ("solver", "daqp", "abacus"),
+        ("thrust max", 20.0, 5.0),
     ],
 )
 def test_inputs_of_watchers_and_refused_ones_are_put_back(page, capsys, label, value, hostile):

@@ -105,9 +105,28 @@ def test_a_weight_acts_at_the_next_tick():
     assert not np.array_equal(thrusts[0][place], thrusts[1][place])
 
 
+def test_a_thrust_limit_acts_at_the_next_tick_and_leaves_a_lost_rotor_off():
+    session = Session(START)
+    fly(session, 100)
+    loop, (lower, upper) = session.qp.loop, session.qp.loop.world.plant.thrust_limits
+    upper[1] = 0.0  # lost, and not reported
+    loop.world.plant.thrust_limits = np.minimum(lower, upper), upper
+    for ceiling in (10.5, 52.56):
+        session.change("thrust", {"thrust_max_n": ceiling})
+        session.step()
+        assert loop.pilot.measurement is not None and loop.pilot.measurement.thrust_max is not None
+        expected = [ceiling, 0.0, *[ceiling] * 4]
+        assert loop.pilot.measurement.thrust_max.tolist() == expected
+        assert loop.world.plant.thrust_limits[1].tolist() == expected
+
+
 @pytest.mark.parametrize(
     ("kind", "values", "named"),
     [
+        ("thrust", {"thrust_max_n": math.nan}, "thrust_max_n"),
+        ("thrust", {"thrust_max_n": 5.0}, "allowed is 9.81"),
+        ("thrust", {"thrust_max_n": "full"}, "one number"),
+        ("thrust", {"push_n": 20.0}, "one number"),
         ("set", {"weights.push": float("nan")}, "weights.push"),
         ("set", {"weights.pull": 1.0}, "weights.pull"),
         ("set", {"solver.name": "abacus"}, "abacus"),
