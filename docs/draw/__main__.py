@@ -1,4 +1,7 @@
-"""Pictures of the documentation, from the code that they show: ``python docs/draw [NAME ...]`` writes docs/pictures."""
+"""Pictures of the documentation, from the code that they show: ``python docs/draw [NAME ...]`` writes docs/pictures.
+
+Only by its name, since it needs playwright and chromium: ``python docs/draw live`` writes docs/images/tuning.webp.
+"""
 
 from __future__ import annotations
 
@@ -26,3 +29,9 @@ with matplotlib.rc_context({"svg.hashsalt": "ibvs_qp", "font.size": 9}):  # the 
             PICTURES[name]().savefig(FOLDER / f"{name}.svg", metadata={"Date": None}, facecolor="white")
 if "vision" in names:
     cv2.imwrite(str(FOLDER / "vision.jpg"), vision()[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+if "live" in names:
+    from live import live
+
+    from sim.video.animation import write_webp
+
+    write_webp(live(), FOLDER.parent / "images" / "tuning.webp")

@@ -27,6 +27,8 @@ class Supervisor:
         policy: Rules of the faults.
     """
 
+    CONSTANTS = ("_policy",)
+
     def __init__(self, policy: Mapping[Fault, Rule] = POLICY) -> None:
         self._policy = policy
         self.reset()

@@ -145,7 +145,7 @@ class LogServer:
     """
 
     def __init__(self, flight: LoggedFlight, server: viser.ViserServer) -> None:
-        self._flight, self._server, self._showing = flight, server, threading.Lock()  # viser has a pool of threads
+        self._flight, self._server = flight, server
         self._what_if = WhatIf(straightened(flight.config.controller))
         self._scene = LiveScene(server, flight.scene, flight.config, flight.seed)
         vehicle, gui = flight.config.controller.vehicle, server.gui
@@ -162,19 +162,18 @@ class LogServer:
             charts = Charts(gui, flight.places, flight.limits, self._what_if.rotors, kept_s=math.inf)
         charts.add(flight.rows[:: max(len(flight.rows) // _MOST_ROWS, 1)])
         charts.show()
-        tick.on_update(guarded(lambda _: self.show(tick.value)))
         self.show(0)
+        tick.on_update(guarded(lambda _: self.show(tick.value)))
 
     def show(self, tick: int) -> None:
         """Show a tick, the last one for a later one."""
         flight = self._flight
         tick = min(max(tick, 0), len(flight.rows) - 1)
         frame = {"row": flight.rows[tick], "ghost": None, "limits": self._limits, "running": False}
-        with self._showing:
-            self._scene.show(frame, flight.places)
-            explained = self._what_if.explain(flight.points[tick])
-            head = f"**Tick {tick}, t = {flight.rows[tick, 0]:.3f} s**"
-            self._why.content = head + "\n\n" + markdown(explained, None, self._what_if.rotors)
+        self._scene.show(frame, flight.places)
+        explained = self._what_if.explain(flight.points[tick])
+        head = f"**Tick {tick}, t = {flight.rows[tick, 0]:.3f} s**"
+        self._why.content = head + "\n\n" + markdown(explained, None, self._what_if.rotors)
 
     def run(self, browser: bool, ready: Callable[[str], None]) -> None:
         """Serve until Ctrl-C."""

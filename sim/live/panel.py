@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -146,8 +145,6 @@ class Panel:
     ) -> None:
         self._server, self._send, self._what_if, self._save = server, send, what_if, save
         self._settings, self._controls = settings, dict[str, Control]()
-        self._writer: int | None = None
-        self._updating = threading.Lock()  # viser has a pool of threads
         self._noticed: dict[int, float] = {}
         self._ticks = self._first = 0
         self.tick_s, self._point = 0.004, None
@@ -171,18 +168,13 @@ class Panel:
             self.saved = gui.add_markdown("Nothing is saved yet.")
         self._events = gui.add_markdown("")
         self._lines: list[str] = []
-        server.on_client_connect(self._came)
-        server.on_client_disconnect(self._left)
 
     # One writer.
 
-    def _came(self, client: viser.ClientHandle) -> None:
-        if self._writer is None:
-            self._writer = client.client_id
-
-    def _left(self, client: viser.ClientHandle) -> None:
-        if self._writer == client.client_id:
-            self._writer = min((each for each in self._server.get_clients() if each != client.client_id), default=None)
+    @property
+    def _writer(self) -> int | None:
+        """The browser that has been here for longest."""
+        return min(self._server.get_clients(), default=None)
 
     def _writes(self, event: Any) -> bool:
         """Whether an event is the writer's; a watcher gets at most one notice a second."""
@@ -215,13 +207,12 @@ class Panel:
             if event.client is None:  # set by the server
                 last[0] = handle.value
                 return
-            with self._updating:
-                if not self._writes(event):
-                    back()
-                    return
-                _check(handle)
-                act()
-                last[0] = handle.value
+            if not self._writes(event):
+                back()
+                return
+            _check(handle)
+            act()
+            last[0] = handle.value
 
         handle.on_update(guarded(update, back))
         return handle
@@ -352,7 +343,7 @@ class Panel:
         """A change was refused."""
         self.note(f"refused: {text}")
         self.show_settings(settings)
-        if (client := self._server.get_clients().get(self._writer or 0)) is not None:
+        if (writer := self._writer) is not None and (client := self._server.get_clients().get(writer)) is not None:
             self._notify(client, "Refused", text)
 
     def note(self, text: str) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import gc
 import math
 import signal
 import time
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from select import select
@@ -19,6 +21,7 @@ from ibvs_qp.config import ControllerConfig
 from ibvs_qp.config.errors import IbvsQpError, out_of_range
 from ibvs_qp.model.inputs import setting_values
 from sim.live.camera_picture import packed_picture
+from sim.live.ghost import Ghost
 from sim.live.presets import changes_text
 from sim.live.rows import LiveLoop
 from sim.live.session import CEILING, Session
@@ -76,11 +79,11 @@ class FlightProcess:
     Args:
         connection: To the server.
         start: Beginning of the session.
-        ghost: Whether a second vehicle flies under the analytic law.
+        ghost: The analytic law beside it.
     """
 
-    def __init__(self, connection: Connection, start: Start, ghost: bool) -> None:
-        self._connection = connection
+    def __init__(self, connection: Connection, start: Start, ghost: Ghost | None = None) -> None:
+        self._connection, self._ghost = connection, ghost
         self._running, self._over = True, ""
         self.session = session = Session(start, ghost)
         assert isinstance(session.qp.loop, LiveLoop)
@@ -191,7 +194,6 @@ class FlightProcess:
         if len(rows):
             self._sent = session.ticks
         last = recorder.rows(session.ticks - 1, session.ticks)
-        ghost = session.ghost.loop.recorder if session.ghost is not None else None  # type: ignore[attr-defined]
         new, self._sent_events = recorder.events_since(self._sent_events), recorder.noted
         table: dict[str, Any] = {
             "ticks": session.ticks,
@@ -203,7 +205,7 @@ class FlightProcess:
             "flown": self._pace.flown,
             "rows": rows,
             "row": last[0] if len(last) else None,
-            "ghost": ghost.rows(ghost.ticks - 1, ghost.ticks)[0] if ghost is not None and ghost.ticks else None,
+            "ghost": self._ghost.pose if self._ghost is not None else None,
             "limits": loop.world.plant.thrust_limits,
             "events": [(event.t, event.kind, event.text) for event in new],
         }
@@ -220,13 +222,14 @@ class FlightProcess:
         return self._loop.world.canvas.thumbnail(PAINT_PX_M)
 
 
-def fly(connection: Connection, start: Start, ghost: bool) -> None:
+def fly(connection: Connection, start: Start, ghost: tuple[Connection, Sequence[float]] | None) -> None:
     """Main function of the process; Ctrl-C is for the server, whose end ends this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        process = FlightProcess(connection, start, ghost)
+        process = FlightProcess(connection, start, None if ghost is None else Ghost(*ghost))
     except IbvsQpError as error:
         connection.send(("failed", str(error)))
         return
     connection.send(("ready", process._recorder.places, process._recorder.limits, process._settings()))
+    gc.freeze()  # a collection does not search what exists for the whole flight
     process.run()

@@ -298,8 +298,7 @@ class LiveScene:
             if self._ghost.visible != (shown := ghost is not None and self.show_ghost):
                 self._ghost.visible = shown
             if ghost is not None and shown:
-                self._ghost.position = FLIP * ghost[places["position"]]
-                self._ghost.wxyz = turned(ghost[places["quaternion"]])
+                self._ghost.position, self._ghost.wxyz = FLIP * ghost[0], turned(ghost[1])
             if frame.get("paint") is not None:
                 self._board.show(frame["paint"])
             if frame.get("picture") is not None:

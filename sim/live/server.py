@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import multiprocessing
+import os
 import subprocess
 import sys
 import threading
@@ -22,6 +23,7 @@ from ibvs_qp.pilot.painting.strategy import PHASES
 from sim.flight.options import pilot_config
 from sim.live.charts import CHARTS_HZ, Charts
 from sim.live.explaining import WhatIf
+from sim.live.ghost import SHARED, follow
 from sim.live.panel import Panel
 from sim.live.process import fly
 from sim.live.rows import STATES
@@ -29,6 +31,8 @@ from sim.live.scene import LiveScene
 from sim.live.session_file import Start
 from sim.live.site import address, open_browser, stop
 
+#: The server and what it starts yield to the flight by so much [-]: ticks have a deadline, pictures have none.
+_NICE = 5
 #: Status lines per second [Hz]; longest wait for the first frame, and for the process to end [s].
 _STATUS_HZ, _READY_S, _END_S = 5.0, 120.0, 5.0
 
@@ -50,10 +54,19 @@ class LiveServer:
     def __init__(self, start: Start, server: viser.ViserServer, out: Path, ghost: bool = True) -> None:
         self._start, self._server, self._out = start, server, out
         context = multiprocessing.get_context("spawn")
-        self._connection, other = context.Pipe()
-        self._flight = context.Process(target=fly, args=(other, start, ghost), name="flight", daemon=True)
-        self._flight.start()
-        other.close()
+        self._connection, *others = context.Pipe()
+        beside, processes = None, []
+        if ghost:
+            shared, pair = context.RawArray("d", SHARED), context.Pipe()
+            beside = pair[0], shared
+            processes.append(context.Process(target=follow, args=(pair[1], start, shared), name="ghost", daemon=True))
+            others += pair
+        self._flight = context.Process(target=fly, args=(others[0], start, beside), name="flight", daemon=True)
+        for process in (self._flight, *processes):
+            process.start()
+        os.nice(_NICE)
+        for other in others:  # each process ends with the one that it serves
+            other.close()
         self._sending, self._closed = threading.Lock(), threading.Event()
         self._log: subprocess.Popen[bytes] | None = None
         self._status_s = self._charts_s = 0.0

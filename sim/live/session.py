@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -68,13 +68,17 @@ class Flight:
         start: Beginning of the session.
         law: The law.
         kind: Class of the loop.
-        offset: Ticks between the beginning of a second and the snapshot in it.
+        offset: Time between the beginning of a second and the snapshot in it [s].
+        kept: Snapshots that are kept [-].
     """
 
-    def __init__(self, start: Start, law: str, kind: type[ClosedLoop] = LiveLoop, offset: int = 0) -> None:
+    def __init__(
+        self, start: Start, law: str, kind: type[ClosedLoop] = LiveLoop, offset: float = 0.0, kept: int = SNAPSHOTS
+    ) -> None:
         self.loop = kind(start.scene, start.options(law), start.config(law), start.job)
         self.digest = hashlib.sha256()
-        self._every, self._offset = ticks_in(SNAPSHOT_S, self.loop.pilot.config.controller.tick_s), offset
+        tick_s, self._kept = self.loop.pilot.config.controller.tick_s, kept
+        self._every, self._offset = ticks_in(SNAPSHOT_S, tick_s), ticks_in(offset, tick_s)
         self._snapshots: list[Snapshot] = []
         self._blocks, self.solver = Blocks(), self.loop.pilot.config.controller.solver.name
         self._keep()
@@ -142,7 +146,20 @@ class Flight:
         plant.thrust_limits = lower, np.minimum(np.where(sound, own, upper), limit)
         self.loop.pilot.thrust_limits = plant.thrust_limits
 
-    def rewind(self, tick: int) -> int:
+    def back(self, tick: int, changes: list[Change]) -> None:
+        """Go back to a tick: continue from the newest snapshot before it, with the changes of the session."""
+        begin = self._restore(tick)
+        due = [change for change in changes if change.tick >= begin]
+        while self.loop.ticks < tick and self.going:
+            for change in [each for each in due if each.tick == self.loop.ticks]:
+                self.apply(change)
+            self.step()
+
+    def close(self) -> None:
+        """End the flight."""
+        self.loop.close()
+
+    def _restore(self, tick: int) -> int:
         """Continue from the newest snapshot up to a tick; returns its tick, which may be earlier."""
         kept = [each for each in self._snapshots if each.ticks <= tick] or self._snapshots[:1]
         self._snapshots, found, loop = kept, kept[-1], self.loop
@@ -166,7 +183,7 @@ class Flight:
             self._snapshots.append(
                 Snapshot(loop.ticks, pilot, world, loop.command, loop.reason, self.solver, self.digest.copy(), events)
             )
-            del self._snapshots[:-SNAPSHOTS]
+            del self._snapshots[: -self._kept]
 
     @property
     def first(self) -> int:
@@ -193,6 +210,27 @@ class Flight:
         engine.reset()
 
 
+def ghost_flight(start: Start) -> Flight:
+    """The analytic law; its snapshots are between those of the QP law, and reach further back."""
+    return Flight(start, "paper", offset=0.5 * SNAPSHOT_S, kept=SNAPSHOTS + 1)
+
+
+class Follower(Protocol):
+    """A flight beside that of a session, see `Flight`."""
+
+    def step(self) -> None:
+        """Fly a tick."""
+
+    def apply(self, change: Change) -> None:
+        """Apply a change before the next tick."""
+
+    def back(self, tick: int, changes: list[Change]) -> None:
+        """Go back to a tick."""
+
+    def close(self) -> None:
+        """End it."""
+
+
 class Session:
     """The QP law, and the analytic law beside it, from one beginning with the same changes of the world.
 
@@ -204,17 +242,19 @@ class Session:
 
     Args:
         start: Beginning.
-        ghost: Whether a second vehicle flies under the analytic law.
+        ghost: Flight of the analytic law.
         kind: Class of the loop of the QP law.
         changes: Changes to come.
     """
 
     def __init__(
-        self, start: Start, ghost: bool = False, kind: type[ClosedLoop] = LiveLoop, changes: tuple[Change, ...] = ()
+        self,
+        start: Start,
+        ghost: Follower | None = None,
+        kind: type[ClosedLoop] = LiveLoop,
+        changes: tuple[Change, ...] = (),
     ) -> None:
-        self.start, self.qp = start, Flight(start, "qp", kind)
-        half = ticks_in(0.5 * SNAPSHOT_S, self.qp.loop.pilot.config.controller.tick_s)
-        self.ghost = Flight(start, "paper", offset=half) if ghost else None
+        self.start, self.qp, self.ghost = start, Flight(start, "qp", kind), ghost
         self.changes, self._next = list(changes), 0
 
     @property
@@ -232,9 +272,9 @@ class Session:
         self._apply_due()
         if isinstance(self.qp.loop, LiveLoop):
             self.qp.loop.recorder.wall_s = time.monotonic()
-        self.qp.step()
-        if self.ghost is not None and self.ghost.going:
+        if self.ghost is not None:
             self.ghost.step()
+        self.qp.step()
 
     def change(self, kind: str, values: dict[str, Any]) -> Change:
         """Change something before the next tick.
@@ -253,21 +293,15 @@ class Session:
     @property
     def first(self) -> int:
         """Earliest tick that can be rewound to."""
-        return max(self.qp.first, self.ghost.first if self.ghost is not None else 0)
+        return self.qp.first
 
     def rewind(self, tick: int) -> None:
         """Go back to a tick of the last minute; changes from then on are dropped: the flight may go another way."""
         tick = min(max(tick, self.first), self.ticks)
         changes = [change for change in self.changes if change.tick < tick]
         for flight in (self.ghost, self.qp):
-            if flight is None:
-                continue
-            begin = flight.rewind(tick)
-            due = [change for change in changes if change.tick >= begin]
-            while flight.loop.ticks < tick and flight.going:
-                for change in [each for each in due if each.tick == flight.loop.ticks]:
-                    flight.apply(change)
-                flight.step()
+            if flight is not None:
+                flight.back(tick, changes)
         self.changes, self._next = changes, len(changes)
 
     def file(self) -> SessionFile:
@@ -279,7 +313,7 @@ class Session:
         """Close both flights."""
         for flight in (self.qp, self.ghost):
             if flight is not None:
-                flight.loop.close()
+                flight.close()
 
     def _apply_due(self) -> None:
         while self._next < len(self.changes) and self.changes[self._next].tick <= self.ticks:

@@ -9,7 +9,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import viser
@@ -35,10 +35,16 @@ def ignored(text: str) -> None:
     print(f"ibvs-qp live: ignored: {' '.join(text.split())[:_LINE]}", file=sys.stderr)
 
 
-def guarded(act: Callable[..., None], undo: Callable[[], None] | None = None) -> Callable[..., None]:
-    """A callback of the page: an error is one line, and is undone."""
+def guarded(
+    act: Callable[..., None], undo: Callable[[], None] | None = None
+) -> Callable[..., Coroutine[None, None, None]]:
+    """A callback of the page: an error is one line, and is undone.
 
-    def call(*values: Any) -> None:
+    It runs in viser's event loop, directly after the message has changed the value: in a pool of threads another
+    callback would see a watcher's value before it is put back.
+    """
+
+    async def call(*values: Any) -> None:
         try:
             act(*values)
         except Exception as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import inspect
 import math
 from types import SimpleNamespace
 
@@ -30,10 +32,8 @@ def page(free_port):
             "thrust_max_n": 52.56,
             "solver.name": "osqp",
         }
-        panel = Panel(
-            server, lambda *values: sent.append(values), settings, WhatIf(config), lambda: None, shown.__setitem__
-        )
-        panel._writer = WRITER
+        Panel(server, lambda *values: sent.append(values), settings, WhatIf(config), lambda: None, shown.__setitem__)
+        server.get_clients = lambda: dict.fromkeys((WATCHER, WRITER))  # type: ignore[method-assign, return-value]
         handles = server.gui._gui_input_handle_from_uuid.values()
         yield sent, shown, lambda label: next(each for each in handles if label in (each.label or ""))
     finally:
@@ -47,7 +47,8 @@ def enter(handle, value, client: int) -> None:
         client=SimpleNamespace(client_id=client, add_notification=lambda *_, **__: None), client_id=client
     )
     for callback in handle._impl.update_cb:
-        callback(event)
+        assert inspect.iscoroutinefunction(callback)  # viser runs others in a pool of threads, after other messages
+        asyncio.run(callback(event))
 
 
 @pytest.mark.parametrize(

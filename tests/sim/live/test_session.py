@@ -17,7 +17,7 @@ from sim.flight.closed_loop import ClosedLoop
 from sim.flight.jobs import PressJob
 from sim.live.process import FlightProcess
 from sim.live.rows import MOST_EVENTS, LiveLoop
-from sim.live.session import SNAPSHOTS, Session, repeat
+from sim.live.session import SNAPSHOTS, Session, ghost_flight, repeat
 from sim.live.session_file import SessionFile, Start
 from sim.live.snapshot import Blocks, WorldState
 from sim.world.scene import Scene
@@ -35,23 +35,23 @@ def fly(session: Session, ticks: int) -> None:
 
 
 def test_a_flight_rewound_and_changed_alike_is_the_same_in_both_laws():
-    session = Session(START, ghost=True)
+    ghost = ghost_flight(START)
+    session = Session(START, ghost)
     fly(session, 300)
     session.change("set", {"weights.push": 0.2})
     fly(session, 150)
     session.change("fault", PUSH)
     session.change("task", {"push_n": 7.0})
     fly(session, 200)
-    assert session.ghost is not None
-    first = session.file(), session.ghost.digest.hexdigest()
+    first = session.file(), ghost.digest.hexdigest()
     session.rewind(400)
-    assert session.ticks == session.ghost.loop.ticks == 400
+    assert session.ticks == ghost.loop.ticks == 400
     assert [change.kind for change in session.changes] == ["set"]
     fly(session, 50)
     session.change("fault", PUSH)
     session.change("task", {"push_n": 7.0})
     fly(session, 200)
-    assert (session.file(), session.ghost.digest.hexdigest()) == first
+    assert (session.file(), ghost.digest.hexdigest()) == first
 
 
 def test_a_fork_goes_another_way_and_its_file_repeats_it(tmp_path):
@@ -220,6 +220,6 @@ def test_a_session_flown_again_prints_json(tmp_path, capsys):
 
 def test_a_rate_that_is_no_number_is_refused():
     here, there = multiprocessing.Pipe()
-    process = FlightProcess(there, START, ghost=False)
+    process = FlightProcess(there, START)
     process._execute("rate", math.nan)
     assert here.recv()[0] == "refused" and math.isfinite(process._pace.rate)
