@@ -30,8 +30,8 @@ with matplotlib.rc_context({"svg.hashsalt": "ibvs_qp", "font.size": 9}):  # the 
 if "vision" in names:
     cv2.imwrite(str(FOLDER / "vision.jpg"), vision()[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 if "live" in names:
-    from live import live
+    from live import RATE_HZ, live
 
     from sim.video.animation import write_webp
 
-    write_webp(live(), FOLDER.parent / "images" / "tuning.webp")
+    write_webp(live(), FOLDER.parent / "images" / "tuning.webp", RATE_HZ)

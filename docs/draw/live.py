@@ -27,14 +27,14 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 PRESSED_S = 6.0
 #: Captions of sliders and their values, a picture every 0.1 s of flight; None moves nothing.
 MOVES = [
-    *[None] * 4,
-    *[("thrust max", value) for value in (45.0, 38.0, 31.0, 25.0, 20.0, 17.0, 15.0, 14.0, 13.5)],
-    *[None] * 4,
-    *[("push [N]", value) for value in (6.0, 8.0, 10.0, 12.0, 14.0, 16.0)],
-    *[None] * 10,
+    *[None] * 3,
+    *[("thrust max", value) for value in (40.0, 30.0, 22.0, 17.0, 15.0, 14.0, 13.0)],
+    *[None] * 5,
+    *[("push [N]", value) for value in (8.0, 12.0, 16.0)],
+    *[None] * 3,
 ]
-#: Pictures of the charts at the end.
-CHARTS = 6
+#: Pictures of the charts at the end, and pictures per second [Hz].
+CHARTS, RATE_HZ = 4, 4.0
 
 
 def live() -> Iterator[np.ndarray]:
@@ -44,8 +44,9 @@ def live() -> Iterator[np.ndarray]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "near.toml"
         file.write_text(dump_toml(scene))
-        command = [sys.executable, "-m", "sim.commands.cli", "live", "--no-open", "--press", "60", "--scene", str(file)]
-        server = subprocess.Popen([*command, "--port", "8790"], stdout=subprocess.PIPE, text=True)
+        command = [sys.executable, "-m", "sim.commands.cli", "live", "--no-open", "--no-ghost", "--press", "60"]
+        command += ["--scene", str(file), "--port", "8790"]
+        server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         try:
             assert server.stdout is not None
             found = re.search(r"http://\S+", server.stdout.readline())

@@ -30,6 +30,8 @@ from sim.storage.atomic import write_text
 
 #: Frames per second of the clock [Hz]; of coverage and pictures among them [Hz].
 FRAME_HZ, PICTURE_HZ = 36.0, 6.0
+#: The same without a new tick [Hz]: a page renders for 250 ms after every message, and leaves the processor no time.
+IDLE_HZ = 2.0
 #: Rates of simulated over real time [-].
 SLOWEST, FASTEST = 0.1, 10.0
 #: A flight that is behind the clock by more than this drops the lost time [s].
@@ -89,7 +91,7 @@ class FlightProcess:
         assert isinstance(session.qp.loop, LiveLoop)
         self._loop, self._recorder = session.qp.loop, session.qp.loop.recorder
         self._pace = Pace(self._loop.pilot.config.controller.tick_s)
-        self._sent = self._sent_events = 0
+        self._sent = self._sent_events = self._framed = 0
         self._next_frame_s = self._next_picture_s = self._speed_s = 0.0
         self._speed_tick, self._speed, self._paint_shown = 0, 0.0, False
 
@@ -111,7 +113,8 @@ class FlightProcess:
         elif not session.going and self._running:
             self._running, self._over = False, self._loop.reason or self._loop.pilot.painter.reason or "finished"
         if now >= self._next_frame_s and select([], [self._connection], [], 0.0)[1]:
-            self._next_frame_s = max(self._next_frame_s + 1.0 / FRAME_HZ, now)
+            rate_hz, self._framed = FRAME_HZ if session.ticks != self._framed else IDLE_HZ, session.ticks
+            self._next_frame_s = max(self._next_frame_s + 1.0 / rate_hz, now)
             self._connection.send(("frame", self._frame(now)))
         if self._connection.poll(min(max(wait_s, 0.0), max(self._next_frame_s - now, 0.0))):
             self._execute(*self._connection.recv())
@@ -136,7 +139,7 @@ class FlightProcess:
 
     def do_step(self, ticks: int) -> None:
         """Fly some ticks while paused."""
-        self._running = False
+        self._running, self._next_frame_s = False, 0.0
         for _ in range(min(ticks, round(1.0 / self._loop.pilot.config.controller.tick_s))):
             if self.session.going:
                 self.session.step()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import itertools
 import multiprocessing
-import os
 import subprocess
 import sys
 import threading
@@ -31,8 +30,6 @@ from sim.live.scene import LiveScene
 from sim.live.session_file import Start
 from sim.live.site import address, open_browser, stop
 
-#: The server and what it starts yield to the flight by so much [-]: ticks have a deadline, pictures have none.
-_NICE = 5
 #: Status lines per second [Hz]; longest wait for the first frame, and for the process to end [s].
 _STATUS_HZ, _READY_S, _END_S = 5.0, 120.0, 5.0
 
@@ -64,7 +61,6 @@ class LiveServer:
         self._flight = context.Process(target=fly, args=(others[0], start, beside), name="flight", daemon=True)
         for process in (self._flight, *processes):
             process.start()
-        os.nice(_NICE)
         for other in others:  # each process ends with the one that it serves
             other.close()
         self._sending, self._closed = threading.Lock(), threading.Event()

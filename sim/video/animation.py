@@ -26,18 +26,19 @@ SPEED_UP, RATE_HZ, LAST_MS = 4.0, 10.0, 2500
 WIDTH, QUALITY = 832, 50
 
 
-def write_webp(frames: Iterable[np.ndarray], file: Path) -> None:
+def write_webp(frames: Iterable[np.ndarray], file: Path, rate_hz: float = RATE_HZ) -> None:
     """Write pictures as an animated WebP that repeats for ever.
 
     Args:
         frames: uint8 RGB of one size.
         file: Where to write.
+        rate_hz: Pictures per second [Hz].
     """
     pictures = []
     for frame in frames:
         height = round(WIDTH * frame.shape[0] / frame.shape[1])
         pictures.append(Image.fromarray(cv2.resize(frame, (WIDTH, height), interpolation=cv2.INTER_AREA)))
-    times = [round(1e3 / RATE_HZ)] * (len(pictures) - 1) + [LAST_MS]
+    times = [round(1e3 / rate_hz)] * (len(pictures) - 1) + [LAST_MS]
     first, *rest = pictures
     with replaced(file) as partial:
         first.save(
