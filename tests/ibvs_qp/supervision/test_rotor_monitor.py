@@ -11,7 +11,7 @@ from rotor_layouts import OCTOROTOR
 from allocation import control_effectiveness
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.supervision.monitors import RotorMonitor
+from ibvs_qp.supervision.rotor_monitor import RotorMonitor
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
