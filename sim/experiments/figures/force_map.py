@@ -1,4 +1,4 @@
-"""Map of force gain, wall and sensor delay: push oscillation with and without impedance, and its predicted limit."""
+"""Map of force gain, wall and sensor delay: deviation of the push with and without impedance, and predicted limit."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from sim.sweep.statistics import select
 from sim.world.scene import ForceTorqueScene, WallScene
 
 VARIANT_WORDS = {"standard": "impedance", "direct": "direct force control"}
-#: Less steady contact than this fraction means that contact is lost; a larger deviation [N] means oscillation.
-CONTACT_FRACTION, OSCILLATES_N = 0.995, 0.5
+#: Less steady contact than this fraction means that contact is lost.
+CONTACT_FRACTION = 0.995
 #: Cells with a smaller deviation are dark on the colour scale [N].
 DARK_BELOW_N = 0.3
 #: Ends of the colour scale of deviations [N].
@@ -49,55 +49,11 @@ def predicted_damping(law: str, variant: str, gain: float, stiffness: float, del
 
 
 def map_cells(table: pl.DataFrame) -> pl.DataFrame:
-    """One row per law, variant and cell: deviation [N], lost, unstable (oscillates or lost), predicted unstable.
-
-    In a flight that did not end as planned contact counts as lost.
-    """
+    """One row per law, variant and cell: deviation [N], and whether contact was lost, or a flight failed."""
     lost = (pl.col("contact_share").fill_null(0.0).median() < CONTACT_FRACTION) | ~pl.col("completed").all()
-    cells = table.group_by("law", "variant", *_CELL, maintain_order=True).agg(
+    return table.group_by("law", "variant", *_CELL, maintain_order=True).agg(
         pl.col("force_std_n").median().alias("deviation"), lost.alias("lost"), pl.len().alias("flights")
     )
-    damping = [predicted_damping(*key) for key in cells.select("law", "variant", *_CELL).iter_rows()]
-    oscillates = (pl.col("deviation") > OSCILLATES_N).fill_null(False)
-    return cells.with_columns((oscillates | pl.col("lost")).alias("unstable"), pl.Series("predicted", damping) < 0.0)
-
-
-def map_caption(table: pl.DataFrame, holds: pl.DataFrame) -> str:
-    """Direct force control against impedance, as counted in the map and in the holds at shipped gains."""
-    cells = map_cells(table)
-    unstable, parts = {}, []
-    for variant, words in VARIANT_WORDS.items():
-        own = cells.filter(pl.col("variant") == variant)
-        unstable[variant] = own["unstable"].sum()
-        gains = own.filter(pl.col("unstable"))[PARAM + "force_gain"]
-        least = f", none below {gains.min():g} times the force gain" if gains.len() else ""
-        parts.append(
-            f"{words} {unstable[variant]} of {own.height} cells ({own['lost'].sum()} lost{least}; the predicted margin "
-            f"agrees in {(own['unstable'] == own['predicted']).sum()})"
-        )
-    shipped = cells.filter((pl.col("variant") == "direct") & (pl.col(PARAM + "force_gain") == 1.0))
-    calm = unstable["direct"] <= unstable["standard"] or (shipped.height and not shipped["unstable"].any())
-    if unstable["direct"] > unstable["standard"]:
-        head = "Direct force control oscillates in a region where impedance is stable"
-        head += ", but not at the shipped gains" if calm else ""
-    else:
-        head = "Direct force control does not oscillate in more cells than impedance"
-    tail = "; touch ramp, scheduled approach and the lag margin of the loop damp direct control "
-    tail += "(docs/how_it_works/contact.md)"
-    return (
-        f"{head}. Push deviation above {OSCILLATES_N:g} N or contact lost: {', '.join(parts)}"
-        f"{_shipped_deviation(holds)}{tail if calm else ''}"
-    )
-
-
-def _shipped_deviation(holds: pl.DataFrame) -> str:
-    """Push deviation of both variants at shipped gains, per wall."""
-    found = []
-    for wall in sorted(holds[PARAM + "stiffness_n_m"].unique()) if holds.height else ():
-        rows = [select(holds, variant=variant, stiffness_n_m=wall)["force_std_n"].median() for variant in VARIANT_WORDS]
-        if None not in rows:
-            found.append(f"{rows[1]:.3f} against {rows[0]:.3f} N at {wall / 1000:g} kN/m")
-    return f"; at shipped gains the push of direct control deviates by {', '.join(found)}" if found else ""
 
 
 def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
@@ -105,7 +61,7 @@ def draw_gain_map(spec: FigureSpec, results: Results) -> Drawn:
     table = select(results.table, spec.where, kind="map")
     if not table.height:
         return {}
-    return {spec.name: (map_caption(table, select(results.table, spec.where, kind="hold")), draw_map(table))}
+    return {spec.name: (spec.caption, draw_map(table))}
 
 
 def draw_map(table: pl.DataFrame) -> Figure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from itertools import accumulate
 
+import numpy as np
 import polars as pl
 import pytest
 from press_trace import press_trace
@@ -28,8 +29,7 @@ def flown(monkeypatch, tmp_path):
         if isinstance(job, PressJob):
             trace = press_trace(scene=scene, bias_n=0.05 if options.law == "qp" else 0.2)
             trace.law = options.law
-            for name, width in (("line_error_px", 2), ("friction_true", 2)):
-                trace.arrays[name] = 0.0 * trace.t[:, None].repeat(width, 1)
+            trace.arrays["friction_true"] = np.zeros((len(trace.t), 2))
             return trace
         return synthetic_trace(Errors(push_error_n=0.1), scene, options.law, options.seed)
 
@@ -55,7 +55,7 @@ def test_json_follows_the_contract(flown, tmp_path, capsys):
         assert cell["law"] in ("qp", "paper") and cell["completed"] == cell["n"]
         assert {"median", "low", "high"} == set(cell["metrics"]["settle_s"])
     assert json.loads((tmp_path / "run" / "force-hold.json").read_text()) == content
-    assert (tmp_path / "run" / "figures" / "force-hold-1.5kNm.png").stat().st_size > 10_000
+    assert (tmp_path / "run" / "figures" / "force-hold-force.png").stat().st_size > 10_000
     page = (tmp_path / "run" / "results.md").read_text()
     assert "0.050" in page and "figures/force-hold-map.png" in page
     assert "| better |" not in page and "| worse |" not in page  # one pair decides nothing
