@@ -7,8 +7,7 @@ from collections.abc import Callable
 from sim.experiments.figures.bars import draw_bars
 from sim.experiments.figures.common import Drawn, Results
 from sim.experiments.figures.curves import draw_curves, draw_rows
-from sim.experiments.figures.flights import draw_flights, draw_spread
-from sim.experiments.figures.force_map import draw_gain_map
+from sim.experiments.figures.flights import draw_flights, draw_maps, draw_spread
 from sim.experiments.figures.wrench_set import draw_wrench_sets
 from sim.experiments.spec import FigureSpec
 
@@ -18,7 +17,7 @@ KINDS: dict[str, Callable[[FigureSpec, Results], Drawn]] = {
     "boxes": draw_spread,
     "curves": draw_curves,
     "flights": draw_flights,
-    "gain map": draw_gain_map,
+    "maps": draw_maps,
     "rows": draw_rows,
     "wrench sets": draw_wrench_sets,
 }

@@ -1,15 +1,20 @@
-"""Figures of stored flights, as in a run folder, and box plots over flights, as in the report of a sweep."""
+"""Figures of stored flights, as in a run folder; box plots and maps over flights, as in the report of a sweep."""
 
 from __future__ import annotations
 
-import polars as pl
+from collections.abc import Callable
 
-from sim.evaluate.figures import figure_of
+import polars as pl
+from matplotlib.figure import Figure as Canvas
+
+from sim.evaluate.figures import Figure, figure_of
 from sim.experiments.figures.common import Drawn, Results, stored_trace
 from sim.experiments.spec import FigureSpec
+from sim.experiments.variants import VARIANTS
 from sim.figures import FIGURES
 from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import varied
+from sim.sweep.figures.maps import draw_figure_maps
 from sim.sweep.spec import LAWS
 from sim.sweep.statistics import select
 
@@ -27,11 +32,22 @@ def draw_flights(spec: FigureSpec, results: Results) -> Drawn:
 
 def draw_spread(spec: FigureSpec, results: Results) -> Drawn:
     """Box plots of the panels' metrics over every parameter that varies."""
-    flown = select(results.table, spec.where, variant=spec.variants[0]).filter(pl.col("completed"))
-    metrics = [panel.metric for panel in spec.panels if panel.metric in flown.columns]
-    columns = varied(flown)
-    return {
-        f"{spec.name}-{metric}": (spec.caption, draw_boxes(flown, figure_of(metric), columns))
-        for metric in metrics
-        if columns
-    }
+    return _over_parameters(spec, results, draw_boxes, "")
+
+
+def draw_maps(spec: FigureSpec, results: Results) -> Drawn:
+    """Heat maps of the panels' metrics over every pair of parameters that vary, one figure per variant."""
+    return _over_parameters(spec, results, draw_figure_maps, "-map")
+
+
+def _over_parameters(
+    spec: FigureSpec, results: Results, draw: Callable[[pl.DataFrame, Figure, list[str]], Canvas], suffix: str
+) -> Drawn:
+    drawn: Drawn = {}
+    for variant in spec.variants:
+        flown = select(results.table, spec.where, variant=variant).filter(pl.col("completed"))
+        name, columns = spec.name + (f"-{variant}" if len(spec.variants) > 1 else "") + suffix, varied(flown)
+        for metric in (panel.metric for panel in spec.panels if panel.metric in flown.columns and columns):
+            words = f"{spec.caption}: {VARIANTS[variant].words}" if len(spec.variants) > 1 else spec.caption
+            drawn[f"{name}-{metric}"] = (words, draw(flown, figure_of(metric), columns))
+    return drawn

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import polars as pl
 import pytest
 from matplotlib.figure import Figure
@@ -12,12 +10,9 @@ from synthetic_trace import synthetic_trace
 from sim.experiments.design import Choice, designs
 from sim.experiments.figures import Results, draw, flights
 from sim.experiments.figures.common import CRASH
-from sim.experiments.figures.force_map import map_cells
 from sim.experiments.figures.medians import plot_medians
 from sim.experiments.spec import experiment
 from sim.sweep.parts import PARAM
-
-GAINS, WALLS = (1.0, 5.0), (1500.0, 10000.0)
 
 
 def table_of(name: str, **figures: float) -> pl.DataFrame:
@@ -31,19 +26,6 @@ def table_of(name: str, **figures: float) -> pl.DataFrame:
     return pl.DataFrame(rows, schema_overrides={"log": pl.String}, infer_schema_length=None)
 
 
-def the_map(bad: float) -> pl.DataFrame:
-    """A map in which direct control deviates by `bad` at five times the gain on the soft wall, all else by 0.1 N."""
-    rows = []
-    for law, variant, gain, wall in itertools.product(("qp", "paper"), ("standard", "direct"), GAINS, WALLS):
-        worse = variant == "direct" and (gain, wall) == (5.0, 1500.0)
-        rows.append(
-            {"law": law, "variant": variant, "seed": 0, "completed": True, "contact_share": 1.0}
-            | {"force_std_n": bad if worse else 0.1, PARAM + "kind": "map"}
-            | {PARAM + "force_gain": gain, PARAM + "stiffness_n_m": wall, PARAM + "delay_s": 0.024}
-        )
-    return pl.DataFrame(rows)
-
-
 def test_failed_flights_are_crosses_and_enter_no_median():
     rows = pl.DataFrame({"completed": [True, True, False, False], PARAM + "x": [1.0] * 4, "y": [1.0, 3.0, 60.0, None]})
     axes = Figure().subplots()
@@ -51,12 +33,6 @@ def test_failed_flights_are_crosses_and_enter_no_median():
     assert sum(line.get_gid() == CRASH for line in axes.lines) == 2
     (middle,) = [line for line in axes.lines if line.get_marker() == "o"]
     assert list(middle.get_ydata()) == [2.0]  # type: ignore[arg-type]
-
-
-def test_a_hold_that_crashed_has_lost_the_wall():
-    table = the_map(0.1).with_columns(pl.col(PARAM + "force_gain").eq(1.0).alias("completed"))
-    cells = map_cells(table)
-    assert (cells["lost"] == (cells[PARAM + "force_gain"] == 5.0)).all()
 
 
 @pytest.mark.parametrize("logged", ["standard", "direct"])
@@ -67,7 +43,8 @@ def test_stored_flights_have_the_figures_of_a_run_folder(monkeypatch, tmp_path, 
     monkeypatch.setattr(flights, "stored_trace", lambda _, rows: made if rows["variant"].first() == logged else None)
     figures = draw(Results(experiment("force-hold"), table, tmp_path))
     name = "force-hold" if logged == "standard" else "force-hold-direct"
-    assert set(figures) == {f"{name}-force", f"{name}-image_error", "force-hold-map"}
+    maps = {f"force-hold-{variant}-map-force_std_n" for variant in ("standard", "direct")}
+    assert set(figures) == {f"{name}-force", f"{name}-image_error"} | maps
 
 
 def test_boxes_are_over_the_parameters_that_vary(tmp_path):
