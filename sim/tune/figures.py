@@ -64,5 +64,5 @@ def draw_unseen(law: str, table: pl.DataFrame) -> Figure:
         draw_boxes(axes, [ratios[np.isfinite(ratios)]], [place], 0.5, law)
     axes.axhline(1.0, **REFERENCE)
     axes.set_xticks(range(len(DRAWN)), [OBJECTIVES[place].label.replace(", ", ",\n") for place in DRAWN])
-    axes.set(yscale="log", ylabel="tuned over shipped", title=f"{law_name(law)}, unseen seeds")
+    axes.set(ylabel="tuned over shipped", title=f"{law_name(law)}, unseen seeds")
     return figure
