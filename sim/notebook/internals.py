@@ -138,6 +138,8 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
         target = [*(line.analytic_command for line in setpoints.lines), level.angle_command]
         inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
         acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
+    turning = contact * setpoints.turning_lever.dot(acceleration[3:]) / vehicle.mass_kg
+    acceleration[:3] -= setpoints.normal * turning  # in contact the push accelerates the tip
     return setpoints.inverse @ (mass @ acceleration - setpoints.bias_wrench)
 
 
