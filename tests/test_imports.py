@@ -20,7 +20,7 @@ ORDER = {
     ).split(),
     "sim": (
         "storage world scenes vehicles sensors rivals faults flight video evaluate scene_fuzz figures sweep report "
-        "detection experiments fault_matrix tune gym_env live notebook bench commands"
+        "detection experiments fault_matrix tune gym_env live bench notebook commands"
     ).split(),
 }
 #: Parts of a folder in the order of their imports. Those of vision are its stages: data passes forward.

@@ -26,12 +26,12 @@ from ibvs_qp.supervision.monitors import (
     EnvelopeMonitor,
     Persistence,
     PushMonitor,
-    RotorMonitor,
     SampleMonitor,
     Tick,
     WallMonitor,
 )
 from ibvs_qp.supervision.rotor_loss import RotorLoss
+from ibvs_qp.supervision.rotor_monitor import RotorMonitor
 from ibvs_qp.supervision.supervisor import Supervisor
 from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.self_check import SelfCheck

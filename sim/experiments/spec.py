@@ -131,6 +131,7 @@ class FigureSpec:
     panels: tuple[Panel, ...] = ()  # from left to right
     variants: tuple[str, ...] = ("standard",)  # drawn first, the first with a full line; others in the data follow
     lines: tuple[Line, ...] = ()  # lines of each panel of kind "rows"
+    draw: tuple[str, ...] = ()  # figures of a run folder (sim.figures.FIGURES) of kind "flights"
 
 
 @dataclass(frozen=True, kw_only=True)

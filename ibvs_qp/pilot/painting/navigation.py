@@ -29,6 +29,9 @@ from ibvs_qp.pilot.painting.stroke import Stroke
 
 #: An odometer that moves by more at once was corrected after a hole in the data, by the velocity at its end [m/s, m].
 MOST_SPEED_M_S, JUMP_M = 1.0, 0.005
+#: Lead of the reference along the strokes over a tip off the wall [m]: an edge that comes into view is followed with
+#: all of it at once. The way of 0.3 s at 0.18 m/s, and four deviations of the odometer after 0.5 m.
+MOST_LEAD_M = 0.07
 #: Phases in which all lines in view count at every tick, and phases on the way to the wall and there.
 _ALL_LINES, _AT_THE_WALL = ("start", "survey"), ("approach", "align", "press", "paint", "retouch", "climb")
 
@@ -128,11 +131,12 @@ class Navigation:
     def move_to(self, u: float, v: float, dt: float) -> tuple[float, float]:
         """Move both references towards a place off the wall; returns their speeds [m/s]."""
         last = self.u_reference, self.v_reference
-        self.u_reference = approached(last[0], u, self.config.survey_speed_m_s * dt)
+        planned = approached(last[0], u, self.config.survey_speed_m_s * dt)
+        self.u_reference = clipped(planned, self.along.u - MOST_LEAD_M, self.along.u + MOST_LEAD_M)
         self.v_reference = approached(last[1], v, self.config.climb_speed_m_s * dt)
         if dt <= 0.0:
             return 0.0, 0.0
-        return (self.u_reference - last[0]) / dt, (self.v_reference - last[1]) / dt
+        return (planned - last[0]) / dt, (self.v_reference - last[1]) / dt
 
     def slide_to(self, v: float, dt: float) -> None:
         """Move the reference across the strokes on the wall."""

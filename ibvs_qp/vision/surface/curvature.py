@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 
 from ibvs_qp.measurement import LARGEST_CURVATURE
@@ -73,7 +72,7 @@ class WallCurvature:
         self.covariance = self.covariance + WANDER**2 * interval_s * np.eye(3)
         design, samples = grid.corners, inverse.reshape(-1)
         model = design @ plane.inverse_depth
-        around = cv2.dilate(plane.component.view(np.uint8), np.ones((3, 3), np.uint8)).reshape(-1) > 0
+        around = plane.component.reshape(-1)
         near = around & (samples > 0.0) & (model > 0.0)
         near &= np.abs(np.divide(model, samples, out=np.ones_like(model), where=near) - 1.0) < GATE
         chosen = np.flatnonzero(near)

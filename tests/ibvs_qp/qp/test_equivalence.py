@@ -110,7 +110,8 @@ def test_with_limits_that_do_not_bind_as_well() -> None:
         controller.reset()
         rng = np.random.default_rng(seed)
         share = float(rng.uniform())
-        pack(controller, *random_tick(rng, seed % 3, lean=0.2 * (seed % 2)), share=share, last=LAST, window=(FLOOR, CEILING))
+        tick = random_tick(rng, seed % 3, lean=0.2 * (seed % 2))
+        pack(controller, *tick, share=share, last=LAST, window=(FLOOR, CEILING))
         data = controller.engine.data
         solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         assert solution is not None

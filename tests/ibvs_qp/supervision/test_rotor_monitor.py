@@ -11,7 +11,7 @@ from rotor_layouts import OCTOROTOR
 from allocation import control_effectiveness
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.supervision.monitors import RotorMonitor
+from ibvs_qp.supervision.rotor_monitor import RotorMonitor
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
@@ -68,9 +68,9 @@ def test_a_weak_rotor_is_no_fault_but_has_a_scale(share: float) -> None:
 
 def test_a_rotor_that_no_scale_explains_is_limited() -> None:
     watch, missing = monitor(), np.zeros(6)
-    missing[2] = 4.0  # whatever it is commanded
-    text = [watch.update(missing, 0.1, HOVER, 0.004 * number) for number in range(200)]
-    assert text[50] == "" and text[-1] == f"{VEHICLE.geometry.names[2]} gives 7.3 N"
+    missing[2] = 3.2  # whatever it is commanded
+    text = [watch.update(missing, 0.1, np.full(6, 25.0), 0.004 * number) for number in range(200)]
+    assert text[50] == "" and text[-1] == f"{VEHICLE.geometry.names[2]} gives 21.8 N"
     assert watch.limits is not None and watch.scale == pytest.approx(1.0)
 
 
@@ -163,6 +163,16 @@ def test_all_rotors_at_a_limit_miss_lift_and_keep_their_lower_limits() -> None:
     assert "N of lift are missing" in text and watch.limits is not None
     lower, upper = watch.limits
     assert np.abs(upper - limit).max() < 0.1 and (lower == VEHICLE.thrust_min).all()
+
+
+def test_three_rotors_at_a_limit_have_it_in_common_with_the_others() -> None:
+    """Each limited by itself, the others were commanded 20 N of their 13 N, and the vehicle turned over."""
+    watch, wanted = monitor(), np.array([20.0, 20.0, 18.0, 11.0, 10.0, 9.0])
+    for tick in range(60):
+        watch.update(np.maximum(wanted - 13.0, 0.0), 0.1, wanted, tick * 0.004)
+    assert watch.limits is not None
+    lower, upper = watch.limits
+    assert upper == pytest.approx(13.0, abs=0.1) and (lower == VEHICLE.thrust_min).all()
 
 
 def test_a_sagging_battery_misses_lift_and_limits_no_rotor() -> None:

@@ -1,96 +1,82 @@
-"""Goals of the law: their flights and figures exist, and the comparison pairs flights by seed."""
+"""Goals: their flights and references exist, and a ratio pairs flights by seed."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
+import sim.experiments
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import load_toml
-from sim.evaluate.figures import figure_of
+from sim.experiments.criteria import EVERY, Bound, Criterion
 from sim.experiments.design import Choice, design
-from sim.experiments.goals.__main__ import HERE, SETS
-from sim.experiments.goals.goal import Goal, Goals, flights_of, outcome
 from sim.experiments.spec import Experiment
+from sim.experiments.verdict import GOALS, evaluate, verdicts
 
-BEFORE = pl.read_csv(HERE / "law" / "before.csv")
-GOALS = {name: load_toml(Goals, HERE / name / "goals.toml").goals for name in SETS}
-RUNS = {
-    name: design(load_toml(Experiment, HERE / name / "flights.toml"), Choice(features="geometric")) for name in SETS
-}
+SETS = sorted(file.stem for file in Path(sim.experiments.__file__).parent.glob("goals/*.toml"))
+CRITERION = Criterion(text="path", metric="path_rms_m", ratio_at_most=0.8, before="before.csv")
 
 
 @pytest.mark.parametrize("name", SETS)
 def test_every_goal_has_flights_and_those_of_its_reference(name: str) -> None:
-    for goal in GOALS[name]:
-        flights = flights_of(goal, RUNS[name])
-        seeds = {run.seed for run in flights}
-        assert len(flights) >= 10 and figure_of(goal.figure).words
-        old = BEFORE.filter((pl.col("kind") == goal.kind) & (pl.col("world") == goal.world))
-        if goal.against:
-            assert {run.seed for run in flights_of(replace(goal, kind=goal.against), RUNS[name])} >= seeds, goal
-        elif goal.ratio_at_most is not None:
-            assert set(old["seed"]) == seeds and old[goal.figure].null_count() == 0, goal
+    spec = load_toml(Experiment, GOALS / f"{name}.toml")
+    flown: dict[tuple, set[int]] = {}
+    for run in design(spec, Choice(features="geometric")):
+        flown.setdefault((run.law, tuple(sorted(run.params.items()))), set()).add(run.seed)
+    before = pl.read_csv(GOALS / "before.csv")
+    for goal in spec.every_criterion():
+        cells = {
+            key: seeds for key, seeds in flown.items() if key[0] == goal.law and set(goal.where.items()) <= set(key[1])
+        }
+        assert cells and min(len(seeds) for seeds in cells.values()) >= 5
+        for (law, params), seeds in cells.items():
+            if goal.against:
+                assert flown[law, tuple(sorted((dict(params) | goal.against).items()))] >= seeds
+            elif goal.before:
+                same = [pl.col(f"param.{key}") == value for key, value in params]
+                assert set(before.filter(*same).drop_nulls(goal.metric)["seed"]) >= seeds
 
 
-def flown(factor: float) -> pl.DataFrame:
-    """Flights with this multiple of the path error of before."""
-    old = BEFORE.filter((pl.col("kind") == "paint") & (pl.col("world") == "harsh"))
-    return old.select(
-        pl.col("kind").alias("param.kind"),
-        pl.col("world").alias("param.world"),
-        "seed",
-        pl.lit(True).alias("completed"),
-        pl.col("path_rms_straight_m") * factor,
-    )
+def flights(kind: str, values: list[float | None], completed: bool = True) -> pl.DataFrame:
+    facts = {"experiment": "goals", "law": "qp", "variant": "standard", "param.kind": kind, "completed": completed}
+    rows = [facts | {"seed": seed, "path_rms_m": value} for seed, value in enumerate(values)]
+    return pl.DataFrame(rows, schema_overrides={"path_rms_m": pl.Float64})
 
 
-def test_a_ratio_is_that_of_flights_with_the_same_seed() -> None:
-    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", ratio_at_most=0.8)
-    for factor, met in ((0.7, True), (0.9, False)):
-        found = outcome(goal, flown(factor).sample(fraction=1.0, shuffle=True, seed=1), BEFORE, 10)
-        assert found.ratio == pytest.approx(factor) and found.interval == pytest.approx((factor, factor))
-        assert found.n == 10 and found.met is met and found.cells[-1] == ("yes" if met else "NO")
+@pytest.mark.parametrize(("factor", "met"), [(0.7, True), (0.9, False)])
+def test_a_ratio_is_that_of_flights_with_the_same_seed(factor: float, met: bool) -> None:
+    old = flights("flat", [0.001 * (seed + 1) for seed in range(10)])
+    new = old.with_columns(pl.col("path_rms_m") * factor).sample(fraction=1.0, shuffle=True, seed=1)
+    found = evaluate(CRITERION, {}, new, {}, old)
+    assert (found.median, found.worst) == pytest.approx((factor, factor)) and found.met is met
 
 
 def test_a_flight_that_is_missing_or_failed_meets_nothing() -> None:
-    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", ratio_at_most=0.8)
-    good = flown(0.7)
-    failed = good.with_columns(pl.when(pl.col("seed") == 3).then(False).otherwise(True).alias("completed"))
-    empty = good.with_columns(pl.when(pl.col("seed") > 0).then(pl.col(goal.figure)).alias(goal.figure))
-    for flights in (good.head(1), failed, empty):
-        found = outcome(goal, flights, BEFORE, 10)
-        assert not found.met and found.n < 10 and found.ratio == pytest.approx(0.7)
+    old, good = flights("flat", [0.002] * 10), flights("lean", [0.001] * 10)
+    for new, reference in (
+        (flights("lean", [0.001] * 10, completed=False), old),
+        (flights("lean", [None] + [0.001] * 9), old),
+        (good, old.head(9)),
+    ):
+        assert not evaluate(CRITERION, {}, new, {}, reference).met
+    assert evaluate(CRITERION, {}, good, {}, old).met
 
 
-def test_without_flights_no_goal_is_met() -> None:
-    for goal in GOALS["law"]:
-        found = outcome(goal, pl.DataFrame(), BEFORE, 10)
-        assert found.n == 0 and math.isnan(found.now) and not found.met and "–" in found.cells
+def test_reference_flights_are_those_of_the_same_law_and_other_parameters() -> None:
+    spec = load_toml(Experiment, GOALS / "surfaces.toml")
+    table = pl.concat((flights("flat", [0.002] * 10), flights("lean 10", [0.004] * 10)))
+    (found,) = [each for each in verdicts(spec, table) if each.criterion.metric == "path_rms_m" and each.n]
+    assert found.median == pytest.approx(2.0) and not found.met and not np.isnan(found.bound)
 
 
-@pytest.mark.parametrize(("bound", "met"), [(0.9, True), (0.95, False)])
-def test_a_share_is_that_of_all_flights(bound: float, met: bool) -> None:
-    goal = Goal(kind="paint", world="harsh", figure="completed", of="mean", at_least=bound)
-    flights = flown(0.7).with_columns((pl.col("seed") != 3).alias("completed"))
-    found = outcome(goal, flights, BEFORE, 10)
-    assert found.now == pytest.approx(0.9) and found.n == 10 and found.met is met
-
-
-def test_the_worst_flight_counts_completed_or_not() -> None:
-    goal = Goal(kind="paint", world="harsh", figure="path_rms_straight_m", of="largest", at_most=0.001)
-    flights = flown(0.7).with_columns(pl.lit(False).alias("completed"))
-    found = outcome(goal, flights, BEFORE, 10)
-    assert found.now == flights[goal.figure].max() and found.n == 10 and not found.met
-
-
-def test_a_goal_states_one_bound() -> None:
-    with pytest.raises(ConfigError, match="state one of"):
-        Goal(kind="paint", world="harsh", figure="path_rms_m", at_most=1.0, ratio_at_most=1.0)
-    with pytest.raises(ConfigError, match="that of the median"):
-        Goal(kind="paint", world="harsh", figure="path_rms_m", of="mean", ratio_at_most=1.0)
-    with pytest.raises(ConfigError, match="upper bound"):
-        Goal(kind="paint", world="harsh", figure="path_rms_m", of="largest", at_least=1.0)
+def test_a_goal_states_one_bound_and_a_ratio_its_reference() -> None:
+    for refused, words in (
+        ({"at_most": 1.0, "ratio_at_most": 1.0}, "needs one of"),
+        ({"ratio_at_most": 1.0}, "either against or before"),
+        ({"ratio_at_most": 1.0, "before": "before.csv", "statistic": EVERY}, "ratio of medians"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            Bound(text="path", metric="path_rms_m", **refused)

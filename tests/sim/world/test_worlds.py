@@ -11,6 +11,7 @@ import pytest
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
 from sim.world.errors import PROFILES, WorldErrors, single_errors, world_errors, world_names
+from sim.flight.options import FlightOptions, pilot_config
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, OWN, in_world, world_name
 
@@ -116,3 +117,10 @@ def test_an_unknown_world_is_refused_with_the_known_ones():
         in_world(Scene(), "kind")
     with pytest.raises(ConfigError, match=r"cannot read nowhere\.toml"):
         in_world(Scene(), "nowhere.toml")
+
+
+@pytest.mark.parametrize(("world", "trim_deg"), [("datasheet", 0.0), ("harsh", 0.0), ("field", 2.0)])
+def test_jobs_outside_permit_a_tilt(world: str, trim_deg: float) -> None:
+    for law in ("qp", "paper"):
+        config = pilot_config(in_world(Scene(), world), FlightOptions(law=law))
+        assert config.controller.limits.trim_deg == trim_deg

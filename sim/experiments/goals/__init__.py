@@ -1,1 +1,0 @@
-"""Goals of figures over flights; every folder is a set with its flights and goals."""
