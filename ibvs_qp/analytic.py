@@ -42,7 +42,8 @@ def analytic_wrench(setpoints: Setpoints) -> np.ndarray:
         inverse = _pseudo_inverse(matrix)
         acceleration = inverse.dot(image_acceleration) + acceleration - inverse.dot(matrix.dot(acceleration))
     wrench = setpoints.mass_matrix @ acceleration
-    along = float(setpoints.normal.dot(wrench[:3]))
+    # The push accelerates the tip, which a leaning wall moves along n by a turn of the body, too.
+    along = float(setpoints.normal.dot(wrench[:3]) + setpoints.turning_lever.dot(acceleration[3:]))
     wrench[:3] += setpoints.normal * setpoints.contact_weight * (setpoints.push_command - along)
     return wrench
 

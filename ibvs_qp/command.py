@@ -106,7 +106,7 @@ class Command:
     Attributes:
         stamp_ns: Time of the measurement answered.
         thrusts: Commanded rotor thrusts [N], (n,), always finite and within the limits.
-        wrench: B @ thrusts [N, N m], (6,).
+        wrench: B @ thrusts [N, N m], (6,); with a weak rotor, of the thrusts that the rotors give.
         outcome: How it was found.
         mode: Contact phase: "free", "approach", "contact" or "hold".
         rejected: Names of the inputs that were refused, with the reason.

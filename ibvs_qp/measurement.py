@@ -19,6 +19,8 @@ import numpy as np
 from ibvs_qp.frames import GRAVITY
 
 HORIZONTAL, VERTICAL = "horizontal", "vertical"
+#: Largest curvature of a wall [1/m]: a pier of 1 m across.
+LARGEST_CURVATURE = 2.0
 #: Length of a vector with one entry a rotor.
 ROTORS = -1
 
@@ -251,6 +253,9 @@ class FeatureFrame:
         velocity: Linear velocity of the centre of mass in B at capture [m/s], (3,), or None.
         velocity_covariance: Its covariance, (3, 3); unobserved directions have a large variance.
         velocity_stamp_ns: Time for which the velocity holds; 0 means at capture (flow: half a frame earlier).
+        curvature: Normal curvatures of the wall (right right, right down, down down) [1/m], (3,), right being level,
+            > 0 where it bulges towards the camera, or None for a flat one. Plane and lines are then those of the
+            tangent plane at the tip, onto which the wall is unrolled.
     """
 
     lines: tuple[LineFeature, ...]
@@ -259,6 +264,7 @@ class FeatureFrame:
     velocity: np.ndarray | None = channel(3, **_VELOCITY)
     velocity_covariance: np.ndarray | None = channel(3, 3, **_COVARIANCE)
     velocity_stamp_ns: int = 0
+    curvature: np.ndarray | None = channel(3, bound=LARGEST_CURVATURE, unit="1/m", default=None, held=False)
 
 
 @dataclass(frozen=True, kw_only=True)

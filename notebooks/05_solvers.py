@@ -8,20 +8,21 @@ app = marimo.App(width="medium", app_title="Solvers")
 with app.setup:
     import marimo as mo
     import numpy as np
-    import polars as pl
 
-    from sim.notebook.internals import shipped_osqp_settings
+    from ibvs_qp.config import SolverSettings
+    from sim.figures.style import legend_below, new_figure
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
-    from sim.notebook.solver_figures import draw_race, draw_settings, draw_ticks
     from sim.notebook.solvers import (
         NEVER,
         contenders,
+        draw_race,
+        draw_ticks,
         exact_solutions,
-        osqp_workspace,
         race,
         race_table,
         transition,
+        workspace,
     )
     from sim.notebook.wall_flights import WallTask, record_flight
 
@@ -76,7 +77,8 @@ def _(flight, residuals, stretch, ticks):
     P x + q + A^T y = 0, \qquad l \le A x \le h, \qquad y_+^T (h - A x) = 0, \quad y_-^T (A x - l) = 0
     $$
 
-    to a relative {residuals.max():.0e} at the worst tick: it is exact to rounding.
+    to a relative {residuals.max():.0e} at the worst tick (primal and dual residual, duality gap): it is exact to
+    rounding.
     """)
     return
 
@@ -92,10 +94,11 @@ def _(exact, ticks):
 def _(results):
     mo.md(
         r"""
-    **How to read it.** Each dot is one way to solve the same ticks in Python. To the right: time per tick (dot: median,
-    line: to the 99th percentile). Upwards: distance of the thrusts to the exact ones. Times belong to the computer that
-    made this copy; only their ratios are general. *Shipped* is the whole engine of the controller: OSQP, the acceptance
-    test (status, finiteness, bounds, residuals), and DAQP in the same tick when the test fails.
+    **How to read it.** Each row is one way to solve the same ticks in Python. Left: time per tick (dot: median, line:
+    to the 99th percentile). Right: distance of the thrusts to the exact ones; dotted: a tick, and an error below the
+    noise of the thrusts. Times belong to the computer that made this copy; only their ratios are general. *Shipped* is
+    the whole engine of the controller: OSQP, the acceptance test (status, finiteness, bounds, residuals), and DAQP in
+    the same tick when the test fails. Blue rows are the solvers of `solver.name` on a warm workspace, without it.
 
     """
         + race_table(results)
@@ -109,9 +112,10 @@ def _(results):
       test with an error of newtons along the push. Tested every 5 iterations at 1e-3 it stops too early. The defaults
       are more accurate at the same tolerance only because they test every 25 iterations.
     - *Each decade of tolerance* costs some iterations and gains about one digit.
-    - *DAQP with a persistent workspace* is faster than OSQP at this size (six thrusts, a few slacks) **and** exact.
-      Through CasADi or `qpsolvers` conversions cost this lead. In the controller DAQP is the exact fallback. The
-      argument for OSQP is not the median: every iteration costs the same, so a cap on iterations is a deadline.
+    - *DAQP with a persistent workspace* (`solver.name = "daqp"`) is faster than OSQP at this size (six thrusts, a few
+      slacks) **and** exact. Through CasADi or `qpsolvers` conversions cost this lead. In the controller DAQP is the
+      exact fallback. The argument for OSQP is not the median: every iteration costs the same, so a cap on iterations is
+      a deadline.
     - *An infeasible program* yields no certificate from a capped solve. The controller then computes a smallest set of
       conflicting rows itself (Farkas' lemma by non-negative least squares, `ibvs_qp/qp/infeasible.py`).
     """
@@ -145,35 +149,44 @@ def _():
 
 @app.cell
 def _(exact, ticks):
-    CAP = 200
-    _rows = []
+    grid, _figure = {}, new_figure(2.9)
+    _errors, _iterations = _figure.subplots(1, 2)
     for _interval in unless_short((5, 25, 100, NEVER), (25,)):
-        for _tolerance in unless_short((1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-3, 1e-6)):
-            _settings = {"eps_abs": _tolerance, "eps_rel": _tolerance, "check_termination": 5, "max_iter": CAP}
-            _one = race(osqp_workspace("grid", {**_settings, "adaptive_rho_interval": _interval}), ticks, exact)
-            _rows.append(
-                {
-                    "tolerance": _tolerance,
-                    "interval": _interval,
-                    "error_n": float(np.percentile(_one.errors_n, 99.0)),
-                    "iterations": float(np.median(_one.iterations)),
-                    "iterations_p99": float(np.percentile(_one.iterations, 99.0)),
-                }
+        _tolerances = unless_short((1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-3, 1e-6))
+        _found = []
+        for _tolerance in _tolerances:
+            _settings = SolverSettings(
+                tolerance=_tolerance,
+                relative_tolerance=_tolerance,
+                max_iterations=200,
+                adaptive_rho_interval=_interval,
+                adaptive_rho_tolerance=5.0,
             )
-    grid = pl.DataFrame(_rows)
-    picture(draw_settings, grid, CAP)
+            _one = race(workspace("grid", _settings), ticks, exact)
+            grid[_interval, _tolerance] = np.percentile((_one.errors_n, _one.iterations), 99.0, axis=1)
+            _found.append(grid[_interval, _tolerance])
+        _label = "never" if _interval == NEVER else f"every {_interval} iterations"
+        for _axes, _values in zip((_errors, _iterations), zip(*_found, strict=True), strict=True):
+            _axes.plot(_tolerances, _values, "o-", markersize=3, label=_label)
+    for _axes in (_errors, _iterations):
+        _axes.set(xscale="log", xlabel="tolerance (absolute and relative)")
+        _axes.invert_xaxis()
+    _errors.set(yscale="log", ylabel="thrust error [N]", title="Accuracy, 99 % of the ticks")
+    _iterations.set(ylabel="iterations", title="Cost, 99 % of the ticks")
+    legend_below(_figure, title="update of the step size rho")
+    picture(lambda: _figure)
     return (grid,)
 
 
 @app.cell(hide_code=True)
 def _():
-    _shipped = shipped_osqp_settings()
+    _shipped = SolverSettings()
     mo.md(rf"""
     With adaptation, the error follows the tolerance down to the cap of 200 iterations. Without adaptation the error is
     nearly constant: OSQP's initial step size does not suit this program. The shipped settings are a tolerance of
-    {_shipped["eps_abs"]:.0e} (relative {_shipped["eps_rel"]:.0e}), a test every {_shipped["check_termination"]}
-    iterations, adaptation every {_shipped["adaptive_rho_interval"]}, a cap of {_shipped["max_iter"]}, and
-    {_shipped["scaling"]} passes of scaling.
+    {_shipped.tolerance:.0e} (relative {_shipped.relative_tolerance:.0e}), a test every {_shipped.check_interval}
+    iterations, adaptation every {_shipped.adaptive_rho_interval}, a cap of {_shipped.max_iterations}, and
+    {_shipped.scaling} passes of scaling.
 
     ## Your settings
 
@@ -189,23 +202,21 @@ def _():
     check = mo.ui.slider(1, 50, 1, value=5, label="test every ... iterations", show_value=True)
     adapt = mo.ui.slider(5, 200, 5, value=25, label="adapt rho every ... iterations", show_value=True)
     scaling = mo.ui.slider(0, 10, 1, value=2, label="scaling passes", show_value=True)
-    polish = mo.ui.switch(value=False, label="polish: solve exactly on the active rows")
-    mo.hstack([mo.vstack([power, most, check]), mo.vstack([adapt, scaling, polish])], justify="start", gap=3)
-    return adapt, check, most, polish, power, scaling
+    mo.hstack([mo.vstack([power, most, check]), mo.vstack([adapt, scaling])], justify="start", gap=3)
+    return adapt, check, most, power, scaling
 
 
 @app.cell
-def _(adapt, check, exact, most, polish, power, results, scaling, ticks):
-    _settings = {
-        "eps_abs": 10.0**-power.value,
-        "eps_rel": 10.0**-power.value,
-        "max_iter": most.value,
-        "check_termination": check.value,
-        "adaptive_rho_interval": adapt.value,
-        "scaling": scaling.value,
-        "polishing": polish.value,
-    }
-    yours = race(osqp_workspace("yours", _settings, family="yours"), ticks, exact, repeats=unless_short(3, 1))
+def _(adapt, check, exact, most, power, results, scaling, ticks):
+    _settings = SolverSettings(
+        tolerance=10.0**-power.value,
+        relative_tolerance=10.0**-power.value,
+        max_iterations=most.value,
+        check_interval=check.value,
+        adaptive_rho_interval=adapt.value,
+        scaling=scaling.value,
+    )
+    yours = race(workspace("yours", _settings, family="yours"), ticks, exact, repeats=unless_short(3, 1))
     picture(draw_race, [*(one for one in results if one.contender.family != "qpsolvers"), yours])
     return (yours,)
 
@@ -227,8 +238,8 @@ def _(exact, flight, grid, residuals, results, stretch, yours):
         assert errors["OSQP 1e-8"] < 1e-3 < errors["OSQP 1e-3"]  # NaN, no answer, fails these as well
 
     def test_a_tighter_tolerance_costs_iterations_and_gains_accuracy():
-        loose, tight = grid.sort("tolerance").filter(pl.col("interval") == 25)[[-1, 0]].to_dicts()
-        assert loose["iterations_p99"] < tight["iterations_p99"] and loose["error_n"] > tight["error_n"]
+        loose, tight = grid[25, 1e-3], grid[25, 1e-6]
+        assert loose[0] > tight[0] and loose[1] < tight[1]
 
     def test_limits_are_active_in_about_half_of_the_ticks():
         assert 0.3 < flight.limited[stretch].mean() < 0.7 and len(yours.errors_n) == len(exact)

@@ -15,7 +15,6 @@ with app.setup:
     from sim.notebook.noise import (
         FIGURES,
         FORCE,
-        LAWS,
         VS,
         averaged_samples,
         differences_table,
@@ -27,11 +26,13 @@ with app.setup:
         success_table,
         sweep_or_sample,
     )
-    from sim.notebook.noise_figures import draw_boxes, draw_completed, draw_medians, draw_path_and_push
     from sim.notebook.picture import picture
     from sim.notebook.short import unless_short
     from sim.notebook.table import number, table
+    from sim.sweep.figures.boxes import draw_boxes
+    from sim.sweep.figures.maps import draw_figure_maps, draw_success_maps
     from sim.sweep.fingerprint import configuration_hash
+    from sim.sweep.spec import LAWS
 
 
 @app.cell(hide_code=True)
@@ -52,7 +53,7 @@ def _():
 
     ```sh
     ibvs-qp experiment noise-sweep --out runs/noise       # the record: 3 x 3 cells, ten flights, both laws, with vision
-    python -m sim.notebook.noise_sample                   # the sample shown here: lines from the sensor model, 0.3 m
+    ibvs-qp experiment notebooks/data/noise_sample.toml   # the sample shown here: lines from the sensor model, 0.3 m
     ```
     """)
     return
@@ -100,13 +101,16 @@ def _():
 
 @app.cell
 def _(chosen, sweep):
-    picture(draw_boxes, sweep, chosen.value)
-    return
+    done = sweep.filter(pl.col("completed"))
+    picture(draw_boxes, done, chosen.value, [VS, FORCE])
+    return (done,)
 
 
 @app.cell
-def _(chosen, sweep):
-    mo.vstack([picture(draw_completed, sweep), picture(draw_medians, sweep, chosen.value)])
+def _(chosen, done, sweep):
+    mo.vstack(
+        [picture(draw_success_maps, sweep, [FORCE, VS]), picture(draw_figure_maps, done, chosen.value, [FORCE, VS])]
+    )
     return
 
 
@@ -135,12 +139,6 @@ def _(chosen, sweep):
 
     """
     )
-    return
-
-
-@app.cell
-def _(sweep):
-    picture(draw_path_and_push, sweep)
     return
 
 

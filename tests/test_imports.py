@@ -20,14 +20,12 @@ ORDER = {
     ).split(),
     "sim": (
         "storage world scenes vehicles sensors rivals faults flight video evaluate scene_fuzz figures sweep report "
-        "detection experiments fault_matrix tune gym_env notebook bench commands"
+        "detection experiments fault_matrix tune gym_env live bench notebook commands"
     ).split(),
 }
 #: Parts of a folder in the order of their imports. Those of vision are its stages: data passes forward.
 PARTS = {
-    "vision": (
-        "compilation medians config checks picture appearance surface flow lines perception_result paper perception"
-    ).split(),
+    "vision": ("compilation config checks picture appearance surface flow lines perception paper").split(),
     "pilot": "painting config pilot presets".split(),
     "interfaces": "overlay c_library log ros px4".split(),
 }

@@ -22,7 +22,7 @@ from ibvs_qp.estimation.plane_acceleration import plane_force
 from ibvs_qp.estimation.tick_history import TickHistory, sample_interval
 from ibvs_qp.estimation.wall_distance import Plane, Tick
 from ibvs_qp.estimation.wall_lines import WallAxes
-from ibvs_qp.estimation.wall_motion import SLOTS, STATES, WallMotion, predicted_motion
+from ibvs_qp.estimation.wall_motion import SLOTS, STATES, WallMotion, predicted_motion, unrolled
 from ibvs_qp.frames import down_in_body, plane_in_body
 from ibvs_qp.measurement import FeatureFrame, SensorFrame
 from ibvs_qp.symbolic.function import StepFunction
@@ -35,7 +35,7 @@ INERTIAL = ("attitude", "angular_velocity", "specific_force")
 #: accelerometer, whether all of them are measured, and whether the gyro is; sample of the force sensor, and time since
 #: the last one [s], 0 without a new one; contact wrench in its place, if any, and time since the last one that counts
 #: [s]; plane, whether it is new, its age [s]; whether the tip shall press; whether ticks are missing; specific force by
-#: the motors' model [m/s^2]; whether the velocity in the wall plane is young.
+#: the motors' model [m/s^2]; whether the velocity in the wall plane is young; curvature of the wall [1/m].
 INPUTS = {
     "dt": 1,
     "elapsed": 1,
@@ -56,6 +56,7 @@ INPUTS = {
     "doubt": 1,
     "motors_force": 3,
     "velocity_young": 1,
+    "curvature": 3,
 }
 #: Row of a tick in the history, the first states of the function: motion in the wall plane, integrated gyro [rad],
 #: attitude and angular velocity.
@@ -68,6 +69,8 @@ LEAST_RATIO = 0.1
 #: the velocity in a direction that a measurement does not show [m/s].
 HEIGHT_RATE_STD, UNSEEN_STD = 0.1, 30.0
 _NO_WRENCH = (0.0,) * 6
+#: Curvature of a flat wall.
+FLAT = [0.0] * 3
 
 
 class MotorsModel(Protocol):
@@ -136,7 +139,9 @@ def prediction_signals(config: ControllerConfig, estimation: EstimationConfig) -
         use_model=both(contact["in_contact"], value["velocity_young"]),
     )
     tip = vehicle.tip_position_m
-    signals.remember("motion", predicted_motion(motion, rates, axes, tip, dt=dt, force=felt.force, rate=rate))
+    shrinks = unrolled(value["curvature"], contact["distance"])
+    moved = predicted_motion(motion, rates, axes, tip, dt=dt, force=felt.force, rate=rate, shrinks=shrinks)
+    signals.remember("motion", moved)
     signals.remember("turn", turn + dt * rate)
     signals.remember("flown_attitude", attitude)
     signals.remember("flown_rate", rate)
@@ -183,6 +188,7 @@ class Estimator:
         force: Specific force [m/s^2], (3,).
         axes: Axes of the wall and gravity in B.
         wrench: Contact wrench on the vehicle at the centre of mass [N, N m], (6,); wrench_ns: its time.
+        curvature: Of the wall by the last picture (right right, right down, down down) [1/m].
         tared: Whether the bias of the force sensor has been averaged long enough.
 
     Args:
@@ -218,6 +224,7 @@ class Estimator:
         self.attitude, self.rate, self.force = (measured[name] for name in INERTIAL)
         self.axes, self.wrench = WallAxes.of(self.contact.state.normal, self._level), [0.0] * 6
         self._rates[:] = 0.0
+        self.curvature = FLAT
 
     @property
     def lost(self) -> bool:
@@ -293,6 +300,7 @@ class Estimator:
             self._doubt,
             *motors.motors_force,
             self.motion.velocity_age_s < self._estimation.velocity_life_s,
+            *self.curvature,
         )
         self._doubt = False
         self._step.evaluate()
@@ -353,6 +361,7 @@ class Estimator:
             normal, distance = state.normal, state.distance
         else:
             return False
+        self.curvature = FLAT if features.curvature is None else features.curvature.tolist()
         if self._fallback.active:
             self._fallback.correct(features, distance)
         self.motion.correct(features, normal, down_in_body(self.attitude_at(features.stamp_ns)), distance)

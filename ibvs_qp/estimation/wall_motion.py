@@ -64,14 +64,43 @@ INPUTS = {
     "paint": 1,
     "ends": 4,
 }
+#: Part of the way to the centre of a hollow wall up to which the tip's distance counts, and least curvature [1/m].
+TOWARDS_CENTRE, FLATTEST = 0.75, 1e-6
 #: Inputs of a picture without velocity, and without line.
 _NO_VELOCITY, _NO_LINE = (0.0,) * 14, (0.0,) * 13
 #: End points of a line without them.
 _NO_ENDS = (0.0,) * 4
 
 
+def unrolled(curvature: ca.SX, distance: ca.SX) -> ca.SX:
+    r"""Way along a curved wall per way of a tip before it, (2, 2): :math:`(I + d K)^{-1}`.
+
+    A tip at a distance d before a bulge moves on a larger circle than the place before it. Before a hollow wall the
+    matrix is singular at the centre of its curvature; d counts up to `TOWARDS_CENTRE` of the way there.
+
+    Args:
+        curvature: Entries (right right, right down, down down) of K [1/m], (3,).
+        distance: d [m].
+    """
+    first, both, second = ca.vertsplit(curvature)
+    least = 0.5 * (first + second) - ca.sqrt(0.25 * (first - second) ** 2 + both * both)
+    distance = ca.fmin(distance, TOWARDS_CENTRE / ca.fmax(-least, FLATTEST))
+    first, both, second = ca.vertsplit(distance * curvature)
+    first, second = 1.0 + first, 1.0 + second
+    determinant = first * second - both * both
+    return ca.vertcat(ca.horzcat(second, -both), ca.horzcat(-both, first)) / determinant
+
+
 def predicted_motion(
-    state: ca.SX, rates: ca.SX, axes: WallAxes, tip: Sequence[float], *, dt: ca.SX, force: ca.SX, rate: ca.SX
+    state: ca.SX,
+    rates: ca.SX,
+    axes: WallAxes,
+    tip: Sequence[float],
+    *,
+    dt: ca.SX,
+    force: ca.SX,
+    rate: ca.SX,
+    shrinks: ca.SX,
 ) -> ca.SX:
     """State after a tick, (n,): specific force and gyro integrated; the tip moves with the body's rotation, too.
 
@@ -83,10 +112,11 @@ def predicted_motion(
         dt: Time since the last tick [s].
         force: Specific force in B [m/s^2], (3,).
         rate: Angular velocity in B [rad/s], (3,).
+        shrinks: Way along the wall per way of the tip, (2, 2), see `unrolled`.
     """
     to_wall = ca.horzcat(axes.right, axes.down).T
     along, swing = to_wall @ (force + GRAVITY * axes.gravity), to_wall @ ca.cross(rate, ca.DM(tip))
-    way = dt * (state[VELOCITY] + swing)
+    way = shrinks @ (dt * (state[VELOCITY] + swing))
     velocity = state[VELOCITY] + dt * (along - state[BIAS])
     return ca.vertcat(velocity, state[BIAS], state[ODOMETER] + way, state[LINES:] + rates @ way)
 

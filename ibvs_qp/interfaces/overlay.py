@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.lines.line_state import TrackState
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.lines.tracks import TrackState
+from ibvs_qp.vision.perception import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
 
 #: RGB colours: surface tint, mask tint, tracks by kind, tentative or lost tracks, text and its ground.
@@ -57,7 +57,7 @@ def _draw_track(picture: np.ndarray, track: TrackState, ends: np.ndarray) -> Non
     color = _KINDS.get(track.kind, _FAINT) if track.confirmed and track.seen else _FAINT
     first, second = (tuple(int(value) for value in np.round(end)) for end in ends)
     cv2.line(picture, first, second, color, 2, cv2.LINE_AA)
-    for end, reason in zip((first, second), track.ends, strict=True):
+    for end, reason in zip((first, second), track.line.ends, strict=True):
         if reason == "end":
             cv2.circle(picture, end, 4, color, -1, cv2.LINE_AA)
     middle = ends.mean(axis=0)

@@ -223,6 +223,7 @@ class Model:
             "thrust_lower": self.thrust_lower,
             "thrust_upper": self.thrust_upper,
             "contact_weight": self.contact_weight,
+            "turning_lever": self.turning_lever,
         }.items():
             self.output(name, value)
 
@@ -260,8 +261,26 @@ class Model:
 
     @property
     def force_along_normal(self) -> ca.SX:
-        """Net force without contact along n, as a function of the thrusts [N]."""
-        return ca.dot(self.normal, self.wrench[:3])
+        """Mass times the acceleration along n without contact, as a function of the thrusts [N].
+
+        In contact it is the tip's, in free flight that of the centre of mass: a vehicle that turns away from the wall
+        does not turn to keep its distance.
+        """
+        turning = ca.dot(self.turning_lever, self.acceleration[3:])
+        return ca.dot(self.normal, self.wrench[:3]) + self.contact_weight * turning
+
+    @property
+    def turning_lever(self) -> ca.SX:
+        r"""Mass times the acceleration along n per angular acceleration of a tip on a leaning wall [kg m], (3,).
+
+        .. math:: m (n^T d) (r \times d)
+
+        with the tip r and gravity's direction d. It is zero on an upright wall, however the vehicle tilts: a tilt that
+        the push bought there would grow with it, and few rotors may be left to take it back.
+        """
+        vehicle, down = self.config.vehicle, self.body.down
+        lean = ca.dot(self.wall.normal, down)
+        return vehicle.mass_kg * lean * ca.cross(ca.DM(vehicle.tip_position_m), down)
 
     @property
     def body_rotation_gain(self) -> ca.SX:

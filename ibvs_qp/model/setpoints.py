@@ -96,6 +96,7 @@ class Setpoints:
             self.step.inputs[f"contact.{name}"].item for name in ("touching", "known", "push")
         )
         self.normal, self.right, self.down = out["normal"], out["axis_right"], out["axis_down"]
+        self.turning_lever = out["turning_lever"]
         self.bias_wrench, self.velocity_command = out["bias_wrench"], out["velocity_command"]
         self.free, self.lower, self.upper = out["free"], out["thrust_lower"], out["thrust_upper"]
         self.floor, self.ceiling = sensed["thrust_floor"], sensed["thrust_ceiling"]

@@ -22,7 +22,7 @@ from ibvs_qp.pilot.rolling_shutter import RollingShutter
 from ibvs_qp.validation.features import check_features
 from ibvs_qp.validation.measurement import LINES_PER_SLOT
 from ibvs_qp.vision.checks import PictureGate
-from ibvs_qp.vision.lines.line_state import LineHint
+from ibvs_qp.vision.lines.tracks import LineHint
 from ibvs_qp.vision.picture.camera import RgbdCamera
 
 #: Pixels by which pictures are compared: every 16th row and column, of 4096 at most.

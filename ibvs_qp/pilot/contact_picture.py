@@ -14,7 +14,7 @@ from ibvs_qp.measurement import HORIZONTAL
 from ibvs_qp.pilot.config import PilotConfig
 from ibvs_qp.pilot.painting.config import PaintingConfig
 from ibvs_qp.pilot.painting.pattern import Pattern
-from ibvs_qp.vision.picture.mask import propeller_mask, vehicle_mask
+from ibvs_qp.vision.picture.layout import propeller_mask, vehicle_mask
 
 #: Least distance of camera and wall that is computed with [m].
 _LEAST_DEPTH_M = 0.01

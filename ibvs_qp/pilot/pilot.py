@@ -37,7 +37,7 @@ from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.measurement import answered_stamp
 from ibvs_qp.validation.sensor_frame import SensorGate
 from ibvs_qp.validation.thrust_limits import ThrustLimits
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception import PerceptionResult
 
 
 class Controller(Protocol):
@@ -274,7 +274,7 @@ class Pilot(Rebuilt):
         # plan
         limits = supervision.limits(self.thrust_limits)
         target = planning.plan(estimation, supervision, limits, setpoints.push_reference, dt, rejected)
-        self.reference = supervision.reference(planning.reference(target, contact))
+        self.reference = supervision.reference(planning.reference(target, contact, estimation.estimator.curvature))
         # measure
         turning = supervision.rotor_loss.lost
         drifting = turning or supervision.state not in FLYING
@@ -289,7 +289,10 @@ class Pilot(Rebuilt):
             planning.note(*event)
         # supervise
         self._commanded = supervision.explained(command)
+        noted = supervision.rotor_note
         supervision.watch(self._tick(frame, contact, command), setpoints)
+        if supervision.rotor_note != noted:
+            planning.note("rotor", supervision.rotor_note)
         return self._commanded
 
     def _advance(self, stamp_ns: int) -> float:

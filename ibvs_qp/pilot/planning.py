@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -22,6 +23,10 @@ from ibvs_qp.supervision.supervision import Limits, Supervision
 FLYING = (SafetyState.NOMINAL, SafetyState.DEGRADED)
 
 
+#: Least and largest velocity of the centre of mass over that of the tip along a curved wall [-].
+FASTER = 0.25, 3.0
+
+
 class Planning:
     """Runs the strategy; the supervisor ends its job.
 
@@ -37,6 +42,7 @@ class Planning:
     def __init__(self, config: PilotConfig, painter: Strategy | None) -> None:
         vehicle = config.controller.vehicle
         tip, camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
+        self._tip_forward = float(tip[0])
         self._tip_right, self._tip_below, self._tip_ahead = to_camera(tip, camera).tolist()
         self.painter: Strategy = require_strategy(Painter(config.painting) if painter is None else painter)
         self.reset()
@@ -101,7 +107,18 @@ class Planning:
             tared=estimation.estimator.tared,
         )
 
-    def reference(self, command: PaintingCommand, contact: ContactState) -> Reference:
-        """Reference of a command at the measured distance."""
-        depth = self._tip_ahead + (contact.distance if contact.known else ASSUMED_DISTANCE)
-        return image_reference(command, depth, self._tip_below, self._tip_right)
+    def reference(self, command: PaintingCommand, contact: ContactState, curvature: Sequence[float]) -> Reference:
+        r"""Reference of a command at the measured distance.
+
+        The strategy moves along the wall. Before a wall of curvature K the centre of mass, at a distance D, moves at
+        :math:`(I + D K)` times that velocity, since the vehicle turns to face the wall.
+        """
+        distance = contact.distance if contact.known else ASSUMED_DISTANCE
+        reference = image_reference(command, self._tip_ahead + distance, self._tip_below, self._tip_right)
+        if self.painter.descending or not any(curvature):
+            return reference
+        right, both, down = curvature
+        curvatures, directions = np.linalg.eigh(np.array(((right, both), (both, down))))
+        scales = np.clip(1.0 + (self._tip_forward + distance) * curvatures, *FASTER)
+        moves = (directions * scales) @ directions.T
+        return dataclasses.replace(reference, velocity=moves @ reference.velocity, travel=moves @ reference.travel)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ibvs_qp.frames import align_line, camera_twist_matrix
 from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 
 #: Points of a segment from its middle, per half of its length, whose chord is the least-squares line of a bow.
 _PLACES = np.array((-1.0, 1.0)) / math.sqrt(3.0)

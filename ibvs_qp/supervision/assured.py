@@ -66,7 +66,7 @@ class Assured(Rebuilt):
     @np.errstate(all="ignore")  # a host may have numpy raise at every underflow
     def step(self, measurement: Measurement, reference: Reference, contact: ContactState | None = None) -> Command:
         """Thrusts for one tick, as `HybridController.step`; ``Command.safety`` is the state of the supervisor."""
-        controller, supervision, command = self.controller, self.supervision, None
+        controller, supervision, command, shown = self.controller, self.supervision, None, None
         try:
             inputs = controller.check(measurement, reference, contact)
             inputs = inputs._replace(reference=supervision.reference(inputs.reference))
@@ -90,8 +90,10 @@ class Assured(Rebuilt):
             if command is None:
                 command = hover_command(controller.setpoints, stamp, controller.gate.inertial, ())
                 supervision.miss()
-            rejected = (*command.rejected, raised("assured", error))
-            return supervision.explained(dataclasses.replace(command, stamp_ns=stamp, rejected=rejected))
+            if shown is None:  # a second change in a tick would break the rate limit
+                shown = supervision.explained(command)
+            rejected = (*shown.rejected, raised("assured", error))
+            return dataclasses.replace(shown, stamp_ns=stamp, rejected=rejected)
 
     def _with_rotors(self, inputs: Inputs, checked: Measurement) -> Inputs:
         """Inputs with the limits of rotors that do not follow, and with the attitude at which those left carry it."""

@@ -26,12 +26,12 @@ from ibvs_qp.supervision.monitors import (
     EnvelopeMonitor,
     Persistence,
     PushMonitor,
-    RotorMonitor,
     SampleMonitor,
     Tick,
     WallMonitor,
 )
 from ibvs_qp.supervision.rotor_loss import RotorLoss
+from ibvs_qp.supervision.rotor_monitor import RotorMonitor
 from ibvs_qp.supervision.supervisor import Supervisor
 from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.self_check import SelfCheck
@@ -76,6 +76,7 @@ class Supervision:
         self.settings = settings = settings or SafetySettings()
         vehicle = config.vehicle
         self._tick_s, self._weight, self._tip = config.tick_s, vehicle.mass_kg * GRAVITY, vehicle.tip_position_m
+        self._box, self._most_change = (vehicle.thrust_min, vehicle.thrust_max), vehicle.thrust_rate_n_s * config.tick_s
         self.supervisor, self.self_check = Supervisor(), SelfCheck(settings.self_check, load)
         self.rotor_loss = RotorLoss(vehicle, config.gains)
         self._rotors = RotorMonitor(vehicle, control_effectiveness(vehicle.geometry), settings)
@@ -90,6 +91,7 @@ class Supervision:
         for part in (self.supervisor, self.self_check, self.rotor_loss, *monitors):
             part.reset()
         self._last: Tick | None = None
+        self._thrusts: np.ndarray | None = None  # of the last command
         self._first_ns = self._imu_ns = -1
         self._time_s, self._retreat_m = 0.0, self.settings.retreat_m
 
@@ -161,11 +163,32 @@ class Supervision:
         Args:
             reported: Lower and upper thrust limits [N], (n,) each, or None for the configured ones.
         """
-        found = self._rotors.limits if self.settings.supervise else None
+        if not self.settings.supervise:
+            return reported
+        found, scale = self._rotors.limits, self._rotors.scale
+        if scale.min() < 1.0:
+            lower, upper = self._box if reported is None else reported
+            reported = scale * lower, scale * upper
         if reported is None or found is None:
             return found if reported is None else reported
         lower = np.maximum(reported[0], found[0])
         return lower, np.maximum(np.minimum(reported[1], found[1]), lower)
+
+    @property
+    def rotor_note(self) -> str:
+        """Last change of a rotor's scale in words; empty before the first."""
+        return self._rotors.note
+
+    def _scaled(self, command: Command) -> Command:
+        """The command for weak rotors: more than the thrust that they are to give, within limits and thrust rate."""
+        thrusts, last = command.thrusts, self._thrusts
+        if self.rotor_note and self.settings.supervise and last is not None:
+            if self.state is not SafetyState.TERMINATED:
+                thrusts = np.clip(thrusts / self._rotors.scale, *self._box)
+            thrusts = np.clip(thrusts, last - self._most_change, last + self._most_change)
+            command = dataclasses.replace(command, thrusts=thrusts)
+        self._thrusts = thrusts.copy()  # those of the command are the caller's
+        return command
 
     def reference(self, requested: Reference) -> Reference:
         """The reference that the state allows in place of the caller's."""
@@ -201,7 +224,8 @@ class Supervision:
         return law(), None
 
     def explained(self, command: Command) -> Command:
-        """The command with state and reasons."""
+        """The command as the motors get it: for weak rotors, with state and reasons."""
+        command = self._scaled(command)
         if self.state is SafetyState.NOMINAL:
             return command
         return dataclasses.replace(command, safety=self.state, safety_reasons=self.supervisor.reasons)

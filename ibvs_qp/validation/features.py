@@ -11,7 +11,7 @@ from ibvs_qp.validation.fields import FEATURE_FRAME, plain_instance
 from ibvs_qp.validation.geometry import VARIANCE_BOUND, read_line, read_lines, read_plane
 from ibvs_qp.validation.numbers import matrix
 
-(_VELOCITY,) = FEATURE_FRAME.rows
+_VELOCITY, _CURVATURE = FEATURE_FRAME.rows
 #: Identities of the first line of each role without one; further ones count down by two. A given identity is positive.
 _HORIZONTAL_ID, _VERTICAL_ID = -2, -3
 #: Least eigenvalue of a covariance over the largest: below zero by rounding alone.
@@ -38,7 +38,24 @@ def check_features(features: FeatureFrame, most_lines: int, rejected: list[str])
         rejected.append(f"features.lines: {len(lines) - len(first)} with a track_id of another line")
         lines = tuple(line for line in lines if first[line.track_id] is line)
     velocity, covariance = _velocity(features, rejected)
-    return dataclasses.replace(features, lines=lines, plane=plane, velocity=velocity, velocity_covariance=covariance)
+    return dataclasses.replace(
+        features,
+        lines=lines,
+        plane=plane,
+        velocity=velocity,
+        velocity_covariance=covariance,
+        curvature=_curvature(features, rejected),
+    )
+
+
+def _curvature(features: FeatureFrame, rejected: list[str]) -> np.ndarray | None:
+    if features.curvature is None:
+        return None
+    entries = _CURVATURE.entries(features.curvature)
+    if entries is None or not _CURVATURE.accepts(entries):
+        rejected.append(f"features.{_CURVATURE.rejection(features.curvature)}")
+        return None
+    return np.array(entries)
 
 
 def _identified(lines: tuple[LineFeature, ...], rejected: list[str]) -> tuple[LineFeature, ...]:

@@ -165,6 +165,7 @@ class VisionConfig(Checked):
     board_color: tuple[int, int, int] | None = setting(
         None, "colour of the surface; sampled around the seed if absent", low=0, high=255
     )
+    curved: bool = setting(True, "the wall may be round: its curvature is measured, and pictures are unrolled")
     plane: PlaneConfig = field(default_factory=PlaneConfig)
     mask: MaskConfig = field(default_factory=MaskConfig)
     detect: DetectConfig = field(default_factory=DetectConfig)

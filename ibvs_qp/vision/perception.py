@@ -2,37 +2,67 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.frames import R_BODY_CAMERA, down_in_body
-from ibvs_qp.measurement import FeatureFrame, RgbdFrame
+from ibvs_qp.frames import R_BODY_CAMERA, down_in_body, to_camera
+from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
 from ibvs_qp.validation.failure import raised
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.checks import PictureGate, StageClock, finite_vector
 from ibvs_qp.vision.compilation import prepare
 from ibvs_qp.vision.config import VisionConfig
-from ibvs_qp.vision.flow.motion import CameraMotion, surface_motion
-from ibvs_qp.vision.flow.sparse_flow import SparseFlow
-from ibvs_qp.vision.lines.candidates import Candidate, find_candidates
-from ibvs_qp.vision.lines.guides import GuideKeeper
-from ibvs_qp.vision.lines.line_state import LineHint
-from ibvs_qp.vision.lines.segments import half_resolution
-from ibvs_qp.vision.lines.tracks import LineTracker
-from ibvs_qp.vision.perception_result import PerceptionResult, make_result
-from ibvs_qp.vision.picture.exposure import ExposureSteps
-from ibvs_qp.vision.picture.picture import Picture
-from ibvs_qp.vision.surface.layout import PictureLayout
-from ibvs_qp.vision.surface.seeds import UP_LEFT
+from ibvs_qp.vision.flow.motion import CameraMotion, SurfaceMotion
+from ibvs_qp.vision.flow.sparse_flow import FlowVelocity, SparseFlow
+from ibvs_qp.vision.lines.candidates import Candidate
+from ibvs_qp.vision.lines.tracks import LineHint, LineTracker, TrackState
+from ibvs_qp.vision.picture.layout import UP_LEFT, PictureLayout
+from ibvs_qp.vision.picture.picture import ExposureSteps, Picture
+from ibvs_qp.vision.picture.unrolled import unrolled
+from ibvs_qp.vision.surface.curvature import WallCurvature
+from ibvs_qp.vision.surface.plane import PlaneEstimate
 from ibvs_qp.vision.surface.tracker import SurfaceTracker
 
 #: Pictures after a start in which lines are searched often: colours are learned in the first one.
 _WARM_UP = 8
 #: Half width of the search strips where points of the surface give the camera's motion [px at 640].
 _SURFACE_STRIP_PX = 8.0
+
+
+#: The four guides, by the side of the surface on which they lie.
+GUIDE_SIDES = ("top", "bottom", "left", "right")
+#: Direction from a guide towards the surface, in the picture (right, down).
+_INWARD = {"top": (0.0, 1.0), "bottom": (0.0, -1.0), "left": (1.0, 0.0), "right": (-1.0, 0.0)}
+#: A line this near to level or upright may be a guide of that direction [deg].
+_WITHIN_DEG = 40.0
+#: Weakest score of a guide.
+_LEAST_SCORE = 0.30
+#: A challenger takes a guide's place when its score is better by this in two of three pictures.
+_BETTER, _WINS, _WINDOW = 0.08, 2, 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerceptionResult:
+    """Result of one picture."""
+
+    features: FeatureFrame  # lines, plane and velocity for an estimator or a controller
+    plane: PlaneEstimate | None = None  # the surface, or None
+    tracks: tuple[TrackState, ...] = ()  # all tracks, tentative ones included
+    # track of the surface's own top, bottom, left and right edge, None where none is in view
+    guides: dict[str, TrackState | None] = field(default_factory=lambda: dict.fromkeys(GUIDE_SIDES))
+    candidates: tuple[Candidate, ...] = ()  # lines found by a detection in this picture (empty where none ran)
+    refused: str | None = None  # why there is no plane or nothing at all, or None
+    velocity_refused: str | None = None  # why there is no velocity, or None
+    mask: np.ndarray | None = None  # vehicle's mask of this picture, uint8 (H, W), or None
+    intrinsics: tuple[float, float, float, float] | None = None  # (fx, fy, cx, cy) of this picture [px], or None
+    time_ms: dict[str, float] = field(default_factory=dict)  # wall-clock time per stage [ms]
 
 
 class Perception:
@@ -54,19 +84,21 @@ class Perception:
         self._config, self._vehicle, self._inwards = config, vehicle, inwards
         self._camera_position = np.zeros(3) if vehicle is None else np.asarray(vehicle.camera_position_m, float)
         self._colors = SurfaceColors(config.board_color, config.paint_color, config.line.color_gate)
-        self._surface = SurfaceTracker(config.plane, self._colors)
-        self._tracker, self._flow = LineTracker(config), SparseFlow(config.flow, self._camera_position)
+        self._surface, self._tracker = SurfaceTracker(config.plane, self._colors), LineTracker(config, self._colors)
+        self._points, self._flow = SurfaceMotion(), SparseFlow(config.flow, self._camera_position)
         self._layout: PictureLayout | None = None
+        self._curvature = WallCurvature()
+        tip = self._camera_position if vehicle is None else np.asarray(vehicle.tip_position_m, float)
+        self._tip = to_camera(tip, self._camera_position)
         self._exposure, self._guides = ExposureSteps(), GuideKeeper()
         self._gate = PictureGate(in_flight=vehicle is not None)
         self.reset()
 
     def reset(self) -> None:
         """Start again as new: the same pictures then give the same bits."""
-        parts = (self._gate, self._surface, self._tracker, self._flow, self._colors, self._exposure, self._guides)
-        for part in parts:
+        stages = (self._surface, self._curvature, self._tracker, self._points, self._flow, self._guides)
+        for part in (self._gate, self._exposure, self._colors, *stages):
             part.reset()
-        self._grey: np.ndarray | None = None
         self._stamp_ns: int | None = None
         self._missed_turn = np.zeros(3)  # over pictures that were refused [rad]
         self._since_detection, self._frames = self._config.detect.period, 0
@@ -107,7 +139,7 @@ class Perception:
         except Exception as error:  # in flight nothing may raise; the reason is reported instead
             problem = raised("picture not understood", error)
         self._surface.lose()
-        self._grey = None
+        self._points.reset()
         self._flow.reset()
         stamp = frame.stamp_ns if isinstance(frame.stamp_ns, int) else 0
         return PerceptionResult(
@@ -127,34 +159,49 @@ class Perception:
         clock = StageClock()
         frame = self._plain(frame)
         layout = self._laid_out(frame)
-        down = None if attitude is None else R_BODY_CAMERA.T @ np.array(down_in_body(attitude))
-        tilt = None if down is None else float(np.arctan2(-down[0], down[1]))
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
         self._stamp_ns = frame.stamp_ns
-
         motion = self._motion(frame, rotation, velocity, interval)
         before = None if self._surface.plane is None else self._surface.plane.inverse_depth
         predicted = None if before is None else motion.plane(before)
-        refused = self._surface.update(frame, layout, predicted, down, seed_pixel)
+
+        down = None if attitude is None else R_BODY_CAMERA.T @ np.array(down_in_body(attitude))
+        seen, frame = frame, self._unrolled(frame, predicted)
+        picture = Picture(frame, layout, down)
+        refused = self._surface.find_surface(picture, predicted, seed_pixel)
         plane = self._surface.plane
+        if plane is not None and self._config.curved:
+            self._measure_curvature(frame, layout, plane, interval)
+        picture.plane = None if plane is None else plane.abcd[:3]
         clock.lap("plane")
 
-        inverse_depth = None if plane is None else plane.inverse_depth
-        picture = Picture.of(frame.rgb, layout.mask, frame.intrinsics, frame.depth, inverse_depth)
         strip = _SURFACE_STRIP_PX if motion.by_surface else self._config.line.strip_px
-        self._tracker.advance(picture, motion, before, interval, self._colors, tilt or 0.0, strip)
-        self._tracker.hints(hints, picture, self._colors, tilt or 0.0)
+        self._tracker.refine_tracks(picture, motion, before, interval, strip)
+        self._tracker.follow_hints(hints, picture)
         clock.lap("tracks")
 
-        candidates = self._detect(picture, frame, layout, down, tilt, detect)
+        candidates = self._detect(picture, detect)
         clock.lap("detect")
 
-        flow = self._flow.update(frame, layout.excluded, motion, plane, busy=self._since_detection == 0)
+        flow = self._flow.measure_velocity(seen, layout.excluded, motion, plane, busy=self._since_detection == 0)
         clock.lap("flow")
 
-        tracks, least, times = self._tracker.tracks, self._config.track.confidence_min, clock.times
-        return make_result(
-            frame, tracks, plane, flow, tuple(candidates), refused, layout.mask, times, self._guides, least
+        tracks = self._tracker.tracks
+        features = make_features(
+            frame.stamp_ns, tracks, plane, flow, self._config.track.confidence_min, self._curvature.unrolled_by
+        )
+        kept = tuple(map(copy.copy, tracks))
+        return PerceptionResult(
+            features=features,
+            plane=plane,
+            tracks=kept,
+            guides=self._guides.choose(kept),
+            candidates=tuple(candidates),
+            refused=refused,
+            velocity_refused=flow if isinstance(flow, str) else None,
+            mask=layout.mask,
+            intrinsics=frame.intrinsics,
+            time_ms=clock.times,
         )
 
     def _plain(self, frame: RgbdFrame) -> RgbdFrame:
@@ -165,16 +212,29 @@ class Perception:
             return frame
         return dataclasses.replace(frame, rgb=rgb, depth=depth)
 
+    def _unrolled(self, frame: RgbdFrame, predicted: np.ndarray | None) -> RgbdFrame:
+        """The picture before the tangent plane at the tip, where the wall is curved."""
+        curvature = self._curvature.seen() if predicted is not None else self._curvature.flat()
+        if curvature is None or predicted is None:
+            return frame
+        return unrolled(frame, predicted, curvature, self._tip)
+
+    def _measure_curvature(
+        self, frame: RgbdFrame, layout: PictureLayout, plane: PlaneEstimate, interval: float
+    ) -> None:
+        grid = layout.sparse_grid
+        if plane.component.shape == grid.shape:  # a surface just found is measured in the next picture
+            self._curvature.update(grid, grid.mean_inverse_depth(frame.depth), plane, interval)
+
     def _laid_out(self, frame: RgbdFrame) -> PictureLayout:
         """Masks and grid of the picture; for another size or camera new ones, and nothing is followed into it."""
         if self._layout is None or not self._layout.fits(frame):
             self._layout = PictureLayout(frame, self._config, self._vehicle, self._inwards)
-            self._grey = None
             for part in (self._surface, self._tracker):
                 part.lose()
-            for part in (self._flow, self._guides):
+            for part in (self._points, self._flow, self._guides):
                 part.reset()
-            self._colors.forget_light()
+            self._colors.light = None  # its cells are those of one picture size
         return self._layout
 
     def _motion(
@@ -182,26 +242,13 @@ class Perception:
     ) -> CameraMotion:
         """Motion of the camera since the picture before: without a gyro by the surface's points, else as if still."""
         if rotation is not None:
-            self._grey = None
-            return CameraMotion.of_body(rotation, velocity, interval, self._camera_position)
-        small, factor = half_resolution(frame.rgb)
-        before, self._grey = self._grey, cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
-        plane, region = self._surface.plane, self._surface.region
-        if before is not None and plane is not None and region is not None:
-            motion = surface_motion(before, self._grey, factor, region.cells, plane, frame.intrinsics)
-            if motion is not None:
-                return motion
-        return CameraMotion.of_body(np.zeros(3), velocity, interval, self._camera_position)
+            self._points.reset()
+        elif (motion := self._points.motion_by_points(frame, self._surface.plane, self._surface.region)) is not None:
+            return motion
+        turn = np.zeros(3) if rotation is None else rotation
+        return CameraMotion.of_body(turn, velocity, interval, self._camera_position)
 
-    def _detect(
-        self,
-        picture: Picture,
-        frame: RgbdFrame,
-        layout: PictureLayout,
-        down: np.ndarray | None,
-        tilt: float | None,
-        requested: bool,
-    ) -> list[Candidate]:
+    def _detect(self, picture: Picture, requested: bool) -> list[Candidate]:
         """Search for lines when a search is due or requested."""
         self._since_detection += 1
         self._frames += 1
@@ -212,9 +259,85 @@ class Perception:
         if self._surface.plane is None or not (self._since_detection >= period or requested):
             return []
         self._since_detection = 0
-        surface = self._surface.region_now(frame, layout, down)
-        self._tracker.rescore(picture, surface, self._colors, tilt)
-        followed = tuple(track.line for track in self._tracker.tracks if calm and track.settled)
-        candidates = find_candidates(picture, surface, self._colors, self._config, tilt, followed)
-        self._tracker.offer(candidates, picture)
-        return candidates
+        return self._tracker.find_lines(picture, self._surface.region_now(picture), calm)
+
+
+def make_features(
+    stamp_ns: int,
+    tracks: Sequence[TrackState],
+    plane: PlaneEstimate | None,
+    flow: FlowVelocity | str,
+    least_certainty: float = 0.0,
+    curvature: np.ndarray | None = None,
+) -> FeatureFrame:
+    """Features of one picture: of its tracks the confirmed and certain ones of positive weight, seen or not."""
+    lines = tuple(
+        LineFeature(
+            rho=track.rho,
+            theta=track.theta,
+            covariance=track.covariance,
+            role=track.role,
+            weight=track.weight,
+            stamp_ns=stamp_ns,
+            track_id=track.track_id,
+            segment=track.segment,
+            surface_side=track.surface_side,
+            kind=track.kind,
+        )
+        for track in tracks
+        if track.confirmed and track.weight > 0.0 and track.certainty >= least_certainty
+    )
+    moving = flow if isinstance(flow, FlowVelocity) else None
+    return FeatureFrame(
+        lines=lines,
+        plane=None if plane is None else plane.abcd,
+        stamp_ns=stamp_ns,
+        velocity=None if moving is None else moving.velocity,
+        velocity_covariance=None if moving is None else moving.covariance,
+        velocity_stamp_ns=0 if moving is None else moving.stamp_ns,
+        curvature=curvature,
+    )
+
+
+def guide_side(line: TrackState) -> str | None:
+    """Which guide a line could be, by the direction in which the surface lies from it; None if it is too slanted."""
+    if line.surface_side == 0:
+        return None
+    x, y = line.surface_side * math.cos(line.theta), line.surface_side * math.sin(line.theta)
+    limit = math.cos(math.radians(_WITHIN_DEG))
+    return next((side for side in GUIDE_SIDES if x * _INWARD[side][0] + y * _INWARD[side][1] > limit), None)
+
+
+class GuideKeeper:
+    """Chooses the guides picture by picture, so that they do not flicker."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the guides so far."""
+        self._holders: dict[str, int] = {}
+        self._wins: dict[str, deque[int]] = {side: deque(maxlen=_WINDOW) for side in GUIDE_SIDES}
+
+    def choose(self, tracks: tuple[TrackState, ...]) -> dict[str, TrackState | None]:
+        """The guide of every side, None where no line is good enough."""
+        result: dict[str, TrackState | None] = dict.fromkeys(GUIDE_SIDES)
+        able = [track for track in tracks if track.borders_plane and track.score >= _LEAST_SCORE]
+        for side in GUIDE_SIDES:
+            lines = [track for track in able if guide_side(track) == side]
+            best = max(lines, key=lambda track: track.score, default=None)
+            if best is None:
+                continue
+            holder = next((track for track in lines if track.track_id == self._holders.get(side)), None)
+            result[side] = self._winner(side, best, holder)
+            self._holders[side] = result[side].track_id  # type: ignore[union-attr]
+        return result
+
+    def _winner(self, side: str, best: TrackState, holder: TrackState | None) -> TrackState:
+        """The best line, or the holder until a challenger was better often enough."""
+        wins = self._wins[side]
+        if holder is None or best.track_id == holder.track_id:
+            wins.append(0)
+            return best
+        wins.append(best.track_id if best.score > holder.score + _BETTER else 0)
+        return best if wins.count(best.track_id) >= _WINS else holder

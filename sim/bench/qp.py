@@ -17,7 +17,7 @@ from ibvs_qp.config.solver import SOLVERS
 from ibvs_qp.controller import HybridController
 from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.problem import ProgramData, QpProblem
-from ibvs_qp.qp.solver import Solver, make_solver
+from ibvs_qp.qp.solver import ProgramValues, Solver, make_solver
 from ibvs_qp.symbolic.machine_code import compiler
 from sim.bench.reference_rival import mink_row
 from sim.bench.stages import stage_medians
@@ -142,7 +142,7 @@ def _direct_solvers(problem: QpProblem) -> dict[str, Solver]:
     return found
 
 
-def qpsolvers_problem(problem: QpProblem, data: ProgramData, dense: bool = False) -> qpsolvers.Problem:
+def qpsolvers_problem(problem: QpProblem, data: ProgramData | ProgramValues, dense: bool = False) -> qpsolvers.Problem:
     """One tick's program in the form of qpsolvers: full P, two-sided rows stacked as G x <= h."""
     upper_triangle, rows = problem.p_pattern.copy(), problem.a_pattern.copy()
     upper_triangle.data, rows.data = data.p.copy(), data.a.copy()

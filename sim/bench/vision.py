@@ -14,7 +14,7 @@ import numpy as np
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import Perception, PerceptionResult, VisionConfig, checks
 from ibvs_qp.vision.paper import PaperPipeline
-from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.picture.layout import PictureLayout
 from sim.bench.mission import PERIOD_NS, Shot, mission_shots
 from sim.bench.timing import Bench, Row
 from sim.detection.manifest import FrameEntry, read_manifest

@@ -146,6 +146,7 @@ def _commands() -> dict[str, type[Command]]:
     from sim.commands.explain import Explain
     from sim.commands.export_c import ExportC
     from sim.commands.faults import Faults
+    from sim.commands.live import Live
     from sim.commands.paint import Paint
     from sim.commands.replay import ReplayCommand
     from sim.commands.sweep import Sweep
@@ -166,6 +167,7 @@ def _commands() -> dict[str, type[Command]]:
         "export-c": ExportC,
         "bridge": BridgeCommand,
         "replay": ReplayCommand,
+        "live": Live,
     }
 
 

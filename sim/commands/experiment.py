@@ -189,6 +189,7 @@ def _print_plan(console: Console, runs: Sequence[Run]) -> None:
 
 def _print_verdicts(console: Console, content: dict[str, Any], worlds: Mapping[str, Sequence[str]]) -> None:
     from sim.evaluate.table import terminal_table
+    from sim.flight.trace import law_name
 
     tables: dict[str, list[tuple[str, ...]]] = {}
     for entry in content["verdicts"]:
@@ -196,6 +197,7 @@ def _print_verdicts(console: Console, content: dict[str, Any], worlds: Mapping[s
             f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in entry["cell"].items()
         ]
         words += [entry["variant"]] if entry["variant"] != "standard" else []
+        words += [law_name(entry["law"])] if entry["law"] != "qp" else []
         figure = entry["figure"] + (f" ({', '.join(words)})" if words else "")
         sign, unit = ">=" if entry["least"] else "<=", f" {entry['unit']}" if entry["unit"] else ""
         median = f"{entry['median']:.3g}{unit}" if math.isfinite(entry["median"]) else "–"
@@ -204,5 +206,5 @@ def _print_verdicts(console: Console, content: dict[str, Any], worlds: Mapping[s
         tables.setdefault(entry["experiment"], []).append(row)
     headings = ("figure", "bound", "median", "flights", "met")
     for name, rows in tables.items():
-        title = f"{name}: criteria of the QP law, world {' and '.join(worlds[name])}"
+        title = f"{name}: criteria, world {' and '.join(worlds[name])}"
         console.print(terminal_table(headings, rows, title, text=headings))

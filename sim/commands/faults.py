@@ -49,7 +49,7 @@ class Faults:
     rows: Annotated[str, tyro.conf.arg(metavar="PATTERN", help_behavior_hint="")] = "*"
     """Names of the rows to fly, with the wildcards * and ?; default: all."""
     world: Annotated[str | None, optional("NAME")] = None
-    """World: ideal, datasheet, harsh, or a TOML file; default: ideal and datasheet."""
+    """World: ideal, datasheet, harsh, field, or a TOML file; default: ideal and datasheet."""
     unsupervised: Annotated[bool, flag] = False
     """Only the flights without the supervisor."""
     controller: Annotated[str | None, optional("MODULE:CLASS")] = None

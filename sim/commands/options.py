@@ -17,7 +17,7 @@ from ibvs_qp.config.files import UnreadableFile, open_regular, read_toml
 from sim.commands.exit_codes import EXIT_INTERRUPTED
 from sim.world.worlds import DEFAULT_WORLD
 
-_WORLD = "World: errors of vehicle and sensors, as ideal, datasheet, harsh, or a TOML file; default: "
+_WORLD = "World: errors of vehicle and sensors, as ideal, datasheet, harsh, field, or a TOML file; default: "
 #: World of the flights of a command without a scene file.
 World = Annotated[str, tyro.conf.arg(metavar="NAME", help=f"{_WORLD}{DEFAULT_WORLD}.", help_behavior_hint="")]
 #: World of a flight that may have a scene file; None takes the errors that the file sets, else the default world.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from ibvs_qp.vision.picture.picture import denormalise, normalise
 
 #: Farthest a point may lie from the corner, in widths of the picture: far outside a lens model is undefined.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import cv2
@@ -9,9 +10,11 @@ import numpy as np
 
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.appearance.colors import SurfaceColors
-from ibvs_qp.vision.config import REFERENCE_WIDTH, LineConfig
-from ibvs_qp.vision.lines.segments import fit_segments
-from ibvs_qp.vision.picture.picture import Picture, denormalise, normalise, normalised_line
+from ibvs_qp.vision.config import REFERENCE_WIDTH, LineConfig, VisionConfig
+from ibvs_qp.vision.lines.refine import FIT_BEYOND, LineFits
+from ibvs_qp.vision.paper.result import normalised_line
+from ibvs_qp.vision.picture.layout import PictureLayout
+from ibvs_qp.vision.picture.picture import Picture, normalise
 from sim.detection.detection import DetectedLine
 from sim.detection.segments import find_segments
 
@@ -26,9 +29,12 @@ _FULL_LENGTH = 0.25
 def every_line(frame: RgbdFrame, config: LineConfig) -> tuple[DetectedLine, ...]:
     """All straight lines of a picture, longest first; needs colour and intrinsics only."""
     rgb = np.require(frame.rgb, np.uint8, ("C", "W"))  # the one type of the kernel
-    picture = Picture.of(rgb, np.zeros(frame.rgb.shape[:2], np.uint8), frame.intrinsics)
+    frame = dataclasses.replace(frame, rgb=rgb)
+    picture = Picture(frame, PictureLayout(frame, VisionConfig(), None))
     segments = find_segments(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY), picture.scale)
-    fits = fit_segments(segments, picture, config, SurfaceColors(None, None, config.color_gate))
+    fits = LineFits(config, SurfaceColors(None, None, config.color_gate)).fit_segments(
+        picture, segments, np.full(len(segments), FIT_BEYOND)
+    )
     lines = []
     for segment, fit in zip(segments.reshape(-1, 2, 2), fits, strict=True):
         if fit is None or _apart(segment, fit.rho, fit.theta, picture) > _STRAY_PX * picture.scale:
@@ -36,7 +42,7 @@ def every_line(frame: RgbdFrame, config: LineConfig) -> tuple[DetectedLine, ...]
             pixels, share = segment, 1.0
         else:
             rho, theta, covariance = fit.rho, fit.theta, fit.covariance
-            pixels, share = denormalise(fit.segment, picture.intrinsics), fit.inlier_share
+            pixels, share = fit.ends_px, fit.inlier_share
         length = float(np.hypot(*(pixels[1] - pixels[0])))
         score = share * min(length / (_FULL_LENGTH * REFERENCE_WIDTH * picture.scale), 1.0)
         lines.append(DetectedLine(pixels=pixels, rho=rho, theta=theta, covariance=covariance, score=score))

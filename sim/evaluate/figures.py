@@ -159,6 +159,10 @@ _FIGURES = (
         lambda p: p.claimed, better=NEITHER,
     ),
     Figure(
+        "false_claim", "false claim", "Whether the pilot reported a job that is not done.",
+        lambda p: float(p.claimed and p.not_completed is not None), better=LESS, shown=False, digits=0,
+    ),
+    Figure(
         "not_completed", "not completed because", "Missing condition of the job; a dash if none.",
         lambda p: p.not_completed, better=NEITHER, exactly="missing condition of `completed`, by the truth; or null",
     ),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ibvs_qp.quaternion import multiply
 from sim.flight.trace import Trace
 from sim.world.board import BoardGeometry
 
@@ -51,8 +52,8 @@ def percentile(values: np.ndarray, percent: float) -> float:
 
 
 def tilt_deg(trace: Trace) -> np.ndarray:
-    """Angle between the body's down axis and the world's [deg], (N,); exact near zero, where arccos is not."""
-    _, x, y, _ = trace.attitude.T
+    """Angle between the body's down axis and gravity [deg], (N,); exact near zero, where arccos is not."""
+    _, x, y, _ = multiply(BoardGeometry(trace.scene).attitude.tolist(), list(trace.attitude.T))
     return np.degrees(2.0 * np.arcsin(np.clip(np.hypot(x, y), 0.0, 1.0)))
 
 

@@ -47,7 +47,6 @@ class Comparison:
     """A figure of the QP and of an opponent over the seeds that both flew.
 
     Attributes:
-        experiment: Name.
         params: Parameters of the cell.
         opponent: Law and variant.
         metric: Figure, or `COMPLETED`.
@@ -58,7 +57,6 @@ class Comparison:
         pairs: Seeds with both figures.
     """
 
-    experiment: str
     params: dict[str, Any]
     opponent: str
     metric: str
@@ -82,12 +80,6 @@ class Comparison:
         low, high = self.interval
         return f"{self.worse:.3g} ({low:.3g} to {high:.3g})"
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Experiment, cell, opponent, figure, how much worse with its interval, threshold that matters, pairs."""
-        cell = ", ".join(f"{name} {value}" for name, value in self.params.items())
-        return self.experiment, cell, self.opponent, self.words, self.worse_text, f"{self.least:.3g}", str(self.pairs)
-
 
 def opponent_name(law: str, variant: str) -> str:
     """Name of a law with its variant."""
@@ -109,7 +101,7 @@ def comparisons(experiment: Experiment, table: pl.DataFrame) -> list[Comparison]
             mine = next((flown["qp", each] for each in own if ("qp", each) in flown), None)
             if mine is not None:
                 name, theirs = opponent_name(law, variant), flown[law, variant]
-                found += against(experiment.name, parameters(key), name, mine, theirs, experiment.columns)
+                found += _against(parameters(key), name, mine, theirs, experiment.columns)
     return found
 
 
@@ -141,25 +133,14 @@ def _joint(outcomes: set[Outcome]) -> frozenset[Outcome]:
     return frozenset(decided or (outcomes & {Outcome.NEITHER}) or outcomes)
 
 
-def against(
-    experiment: str,
-    params: dict[str, Any],
-    opponent: str,
-    mine: pl.DataFrame,
-    theirs: pl.DataFrame,
-    columns: Sequence[Column],
+def _against(
+    params: dict[str, Any], opponent: str, mine: pl.DataFrame, theirs: pl.DataFrame, columns: Sequence[Column]
 ) -> list[Comparison]:
-    """Figures of one cell against one opponent; ends of flights count by the seeds that only one law completes.
+    """Figures of one cell of the QP against one opponent; ends count by the seeds that only one law completes.
 
-    Args:
-        experiment: Name.
-        params: Parameters of the cell.
-        opponent: Name of the opponent.
-        mine: Flights of the QP.
-        theirs: Flights of the opponent.
-        columns: Figures; one that the cell has not, or without a direction, is left out.
+    A figure that the cell does not have, or without a direction, is left out.
     """
-    cell = {"experiment": experiment, "params": params, "opponent": opponent}
+    cell = {"params": params, "opponent": opponent}
     both = mine.join(theirs, on="seed", suffix=".second")
     ended = (both["completed.second"].cast(float) - both["completed"].cast(float)).to_numpy()
     alone = ended[ended != 0.0]

@@ -16,7 +16,7 @@ from sim.experiments.spec import Experiment, Flights, Value, experiment
 from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.faults.air import WindStep
 from sim.faults.fault import Fault
-from sim.faults.rotors import Derate
+from sim.faults.rotors import Derate, ThrustLoss
 from sim.flight.jobs import OwnJob, PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.own_law import check_own
@@ -161,12 +161,14 @@ def _setup(
 
 
 def _faults(flights: Flights, level: Mapping[str, Parameter]) -> tuple[Fault, ...]:
-    delay_s = flights.fault_delay_s
+    timing = {"after": flights.fault_after, "delay_s": flights.fault_delay_s}
+    if flights.fault == "thrust loss":
+        return (ThrustLoss(**timing, rotor=str(level["rotor"]), share=float(level["share"])),)
     if flights.fault == "derate":
         rotor, fraction = str(level["rotor"]), float(level["share"])
         reported = bool(level.get("reported", level.get("told", True)))  # stored tables have the older name
-        return (Derate(delay_s=delay_s, rotor=rotor, share=fraction, reported=reported),)
+        return (Derate(**timing, rotor=rotor, share=fraction, reported=reported),)
     if flights.fault == "wind step":
         north, east, down = (float(level["wind"]) * entry for entry in DIRECTIONS[str(level["direction"])])
-        return (WindStep(delay_s=delay_s, mean_m_s=(north, east, down)),)
+        return (WindStep(**timing, mean_m_s=(north, east, down)),)
     return ()

@@ -152,7 +152,7 @@ class Fields:
         return markdown(heads, rows) + more
 
     def bound_table(self) -> str:
-        """Every bound of the QP law with the flown figure; empty without bounds."""
+        """Every bound with the flown figure; empty without bounds."""
         heads = ("figure", "cell", "bound", "median", "worst flight", "flights within", "met")
         found = verdicts(self.experiment, self.table)
         return markdown(heads, [_bound(self.experiment, each) for each in found]) if found else ""
@@ -176,6 +176,7 @@ def _bound(experiment: Experiment, verdict: Verdict) -> list[str]:
     share = f" in {100.0 * criterion.share:.0f} %" if criterion.every and criterion.share < 1.0 else ""
     where = cell(experiment, verdict.place) or "all"
     where += f", {criterion.variant}" if criterion.variant != "standard" else ""
+    where += f", {law_name(criterion.law)}" if criterion.law != "qp" else ""
     values = (f"{value:.3g}{unit}" if np.isfinite(value) else "–" for value in (verdict.median, verdict.worst))
     met = "**no**" if verdict.words == "no" else verdict.words
     bound, within = f"{sign} {verdict.bound:.4g}{unit}{share}", f"{verdict.within} of {verdict.n}"

@@ -77,6 +77,7 @@ def _verdict_row(name: str, verdict: Verdict) -> dict[str, Any]:
         "experiment": name,
         "figure": criterion.text,
         "metric": criterion.metric,
+        "law": criterion.law,
         "variant": criterion.variant,
         "params": verdict.params,
         "cell": verdict.place,

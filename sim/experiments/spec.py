@@ -79,8 +79,9 @@ class Flights:
     paths: dict[str, tuple[str, ...]] = field(default_factory=dict)  # further paths that take a parameter's value
     laws: tuple[str, ...] = ()  # laws of the flights; empty means those of the variant
     scene: str = choice("default", "scene; random is one per seed, the same under every law", ("default", "random"))
-    fault: str = choice("none", "fault after touch", ("none", "derate", "wind step"))
-    fault_delay_s: float = setting(0.0, "time from touch to the fault", unit="s", low=0.0)
+    fault: str = choice("none", "fault", ("none", "derate", "thrust loss", "wind step"))
+    fault_after: str = choice("touch", "event that starts its delay", ("start", "touch"))
+    fault_delay_s: float = setting(0.0, "time from then to the fault", unit="s", low=0.0)
     features: str = choice("", "overrides the command line", ("", "rendered", "geometric"))
     supervised: bool = False  # whether the supervisor flies along: a lost rotor is its case
     rendered_only: bool = False  # whether the flights need rendered pictures
@@ -130,6 +131,7 @@ class FigureSpec:
     panels: tuple[Panel, ...] = ()  # from left to right
     variants: tuple[str, ...] = ("standard",)  # drawn first, the first with a full line; others in the data follow
     lines: tuple[Line, ...] = ()  # lines of each panel of kind "rows"
+    draw: tuple[str, ...] = ()  # figures of a run folder (sim.figures.FIGURES) of kind "flights"
 
 
 @dataclass(frozen=True, kw_only=True)

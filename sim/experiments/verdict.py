@@ -1,8 +1,9 @@
-"""Evaluation of the criteria of the QP law on the table of flights."""
+"""Evaluation of the criteria on the table of flights."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from sim.experiments.criteria import Criterion
 from sim.experiments.spec import Experiment
 from sim.experiments.wording import varying
 from sim.sweep.statistics import parameters, select, split
+
+#: Folder of the tables of `Bound.before`.
+GOALS = Path(__file__).with_name("goals")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,22 +58,45 @@ class Verdict:
 
 
 def verdicts(experiment: Experiment, table: pl.DataFrame) -> list[Verdict]:
-    """Verdict of each criterion in each cell of the QP law that it applies to."""
+    """Verdict of each criterion in each cell that it applies to."""
     result = []
     for criterion in experiment.every_criterion() if table.height else ():
-        rows = select(table, criterion.where, law="qp", variant=criterion.variant)
+        rows = select(table, criterion.where, law=criterion.law, variant=criterion.variant)
         cells = [(parameters(key), cell) for key, cell in split(rows, ("variant",))]
         places = varying([params for params, _ in cells])
-        result += [evaluate(criterion, *cell, place) for cell, place in zip(cells, places, strict=True)]
+        for (params, cell), place in zip(cells, places, strict=True):
+            reference = _reference(criterion, params, table) if criterion.is_ratio else None
+            result.append(evaluate(criterion, params, cell, place, reference))
     return result
 
 
-def evaluate(criterion: Criterion, params: dict[str, Any], cell: pl.DataFrame, place: dict[str, Any]) -> Verdict:
-    """Evaluate a criterion on the rows of one cell; `place` holds the parameters that name the cell."""
+def _reference(criterion: Criterion, params: dict[str, Any], table: pl.DataFrame) -> pl.DataFrame:
+    """Reference flights of a ratio that ended as planned."""
+    if criterion.before:
+        return select(pl.read_csv(GOALS / criterion.before), params)
+    where = params | criterion.against
+    return select(table, where, law=criterion.law, variant=criterion.variant).filter(pl.col("completed"))
+
+
+def evaluate(
+    criterion: Criterion,
+    params: dict[str, Any],
+    cell: pl.DataFrame,
+    place: dict[str, Any],
+    reference: pl.DataFrame | None = None,
+) -> Verdict:
+    """Evaluate a criterion on the rows of one cell; `place` holds the parameters that name the cell.
+
+    With reference flights the values are ratios to those with the same seeds.
+    """
     values = np.full(cell.height, np.nan)
     measured = criterion.metric in cell.columns
     if measured:
-        values = criterion.scale * cell[criterion.metric].cast(pl.Float64).fill_null(np.nan).to_numpy().copy()
+        found = cell[criterion.metric].cast(pl.Float64)
+        if reference is not None:
+            old = reference.select("seed", pl.col(criterion.metric).cast(pl.Float64).alias("old"))
+            found = found / cell.select("seed").join(old, on="seed", how="left", maintain_order="left")["old"]
+        values = criterion.scale * found.fill_null(np.nan).to_numpy().copy()
     if not criterion.include_failed:
         values[~cell["completed"].to_numpy().astype(bool)] = np.nan  # a crash truncates the measurement
     good = values[np.isfinite(values)]

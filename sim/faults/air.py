@@ -22,12 +22,12 @@ class WindStep(Fault):
 
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Change the wind."""
-        world.plant.wind.change(self.mean_m_s, self.rise_s)
+        world.plant.wind.step_to(self.mean_m_s, self.rise_s)
         return f"wind steps to {self.mean_m_s} m/s (north, east, down)"
 
     def end(self, world: Surroundings, pilot: Pilot) -> None:
-        """The scene's wind again: a gust."""
-        world.plant.wind.change(world.plant.scene.wind.mean_m_s, self.rise_s)
+        """The wind of scene and seed again: a gust."""
+        world.plant.wind.back(self.rise_s)
 
 
 @dataclass(frozen=True, kw_only=True)

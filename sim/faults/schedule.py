@@ -27,10 +27,16 @@ class FaultSchedule:
         self.faults, self._seed = tuple(faults), seed
         self.struck: dict[int, float] = {}
         self._begun: dict[str, float] = {}
+        self._added: dict[int, float] = {}  # times from which the delays of later faults count [s]
         self._filters: dict[int, FrameFilter] = {}
         self._present: set[int] = set()
         self._now = 0.0
         self._waiting: SensorFrame | None = None
+
+    def add(self, now_s: float, *faults: Fault) -> None:
+        """Further faults in flight, whose delays begin now [s]."""
+        self._added.update(dict.fromkeys(range(len(self.faults), len(self.faults) + len(faults)), now_s))
+        self.faults += faults
 
     @property
     def watching(self) -> bool:
@@ -48,7 +54,8 @@ class FaultSchedule:
             self._begun.setdefault("touch", now)
         happened = []
         for index, fault in enumerate(self.faults):
-            if index not in self.struck and now >= self._begun.get(fault.after, math.inf) + fault.delay_s:
+            begun = self._added.get(index, self._begun.get(fault.after, math.inf))
+            if index not in self.struck and now >= begun + fault.delay_s:
                 self.struck[index] = now
                 self._present.add(index)
                 if isinstance(fault, SensorFault):

@@ -10,7 +10,6 @@ from ibvs_qp.config.settings import setting
 from ibvs_qp.pilot import Pilot
 from sim.faults.fault import Fault, Surroundings
 from sim.world.board import BoardGeometry
-from sim.world.contact import contact_stiffness, set_contact
 
 #: Multiples of it, without their whole part, are spread evenly and without order.
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -30,31 +29,29 @@ class OtherWall(Fault):
         """Change the contact of the plant."""
         wall = world.plant.scene.wall
         friction = wall.friction if self.friction is None else self.friction
-        self._set(world, wall.stiffness_n_m * self.stiffness_ratio, friction)
+        _set_wall(world, wall.stiffness_n_m * self.stiffness_ratio, friction)
         return self.words
 
     def end(self, world: Surroundings, pilot: Pilot) -> None:
         """The scene's contact again."""
         wall = world.plant.scene.wall
-        self._set(world, wall.stiffness_n_m, wall.friction)
+        _set_wall(world, wall.stiffness_n_m, wall.friction)
 
-    def _set(self, world: Surroundings, stiffness: float, friction: float) -> None:
-        plant, damping = world.plant, world.plant.scene.wall.damping_n_s_m
-        before = contact_stiffness(plant.model)
-        set_contact(plant.model, stiffness=stiffness, damping=damping, friction=friction)
-        dent = max(float(plant.tip[0]), 0.0)
-        plant.displace(np.array([dent * (before / stiffness - 1.0), 0.0, 0.0]))
+
+def _set_wall(world: Surroundings, stiffness: float, friction: float) -> None:
+    """Another wall under the tip, which pushes as before."""
+    world.plant.displace(world.plant.set_wall(stiffness, friction) * world.plant.normal)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoardMoved(Fault):
-    """Board and wall jump away; the world's origin goes with the board, so it is the vehicle that is moved."""
+    """Board and wall jump away along the normal at the tip; the vehicle is moved, as the world's origin goes along."""
 
     away_m: float = setting(0.1, "distance", unit="m", low=0.0, high=10.0)
 
     def strike(self, world: Surroundings, pilot: Pilot) -> str:
         """Move it."""
-        world.plant.displace(np.array([-self.away_m, 0.0, 0.0]))
+        world.plant.displace(-self.away_m * world.plant.normal)
         return self.words
 
 

@@ -113,16 +113,27 @@ def _truth(flown: Flown, truth: np.ndarray) -> dict[str, np.ndarray]:
     rotation = rotations(attitude)
     every = ticks_in(CLEARANCE_S, flown.config.controller.tick_s)
     rare = slice(None, None, every)
+    board = BoardGeometry(flown.scene)
+    tip = truth[:, PLACES["tip"]].copy()
     clearance = flown.clearance.distances(position[rare], rotation[rare])
     return {
         "position": position.copy(),
         "attitude": attitude.copy(),
         "velocity": in_body(rotation, truth[:, PLACES["velocity"]]),
-        "euler": euler_angles(rotation),
-        "tip": position + rotation @ np.array(flown.vehicle.tip_position_m),
-        "friction_true": truth[:, PLACES["friction"]].copy(),
+        "euler": _angles(board, rotation, tip),
+        "tip": tip,
+        "friction_true": truth[:, PLACES["friction"]][:, 1:].copy(),
         "propeller_clearance": np.repeat(clearance, every)[: len(truth)],
     }
+
+
+def _angles(board: BoardGeometry, rotation: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw against gravity and the wall before the tip [rad], (N, 3)."""
+    angles = euler_angles(board.from_ned.T @ rotation)
+    if not board.surface.flat:
+        yaw = angles[:, 2] - [board.bearing(place) for place in tip]
+        angles[:, 2] = np.arctan2(np.sin(yaw), np.cos(yaw))
+    return angles
 
 
 def _estimates(signals: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

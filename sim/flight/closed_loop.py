@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ibvs_qp.command import Command
 from ibvs_qp.estimation.turned_camera import straightened
@@ -67,6 +67,7 @@ class ClosedLoop:
         command: The pilot's last command; None before the first.
         ticks: Ticks flown.
         limit_s: Time-out [s].
+        recorder_kind: Log of the flight; a subclass may keep less.
         reason: Why the flight ended before its strategy; empty without such an end.
 
     Args:
@@ -76,6 +77,8 @@ class ClosedLoop:
         job: Task at the wall; None paints.
         faults: Faults and their times.
     """
+
+    recorder_kind: ClassVar[type[Recorder]] = Recorder
 
     def __init__(
         self,
@@ -88,7 +91,7 @@ class ClosedLoop:
         config, self._job = pilot_config(scene, options, config), job or PaintJob()
         self.pilot, self.world = make_pilot(scene, options, config, self._job), World(scene, options, config)
         self._legs = tuple((float(right), float(down)) for right, down in self.pilot.painter.legs)
-        self._recorder = Recorder(scene, options, self.world, self.pilot)
+        self._recorder = self.recorder_kind(scene, options, self.world, self.pilot)
         self._schedule = FaultSchedule(faults, options.seed)
         self._log = open_mcap(options, self.world, self.pilot)
         self._step = self.pilot.step if self._log is None else self._log.step
@@ -106,6 +109,10 @@ class ClosedLoop:
     def going(self) -> bool:
         """Whether a further tick belongs to the flight."""
         return not self.reason and (not self.pilot.painter.finished or self._schedule.watching)
+
+    def disturb(self, *faults: Fault) -> None:
+        """Add faults to those of the flight; their delays begin now."""
+        self._schedule.add(self.time_s, *faults)
 
     def sense(self) -> SensorFrame:
         """First half of a tick: faults that are due, and the sensor frame."""

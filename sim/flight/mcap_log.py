@@ -41,9 +41,9 @@ class TruthTick:
         velocity_m_s: The same point's, world [m/s], (3,).
         attitude: Quaternion (w, x, y, z) of B in the world.
         angular_velocity_rad_s: In B [rad/s], (3,).
-        tip_m: Brush tip, world [m], (3,).
+        tip_m: Brush tip in the wall's chart [m], (3,).
         push_n: Normal contact force [N].
-        friction_n: Force of the board on the tip along it, world (y, z) [N], (2,).
+        friction_n: Force of the board on the tip along it (right, down) [N], (2,).
         thrusts_n: Rotor thrusts behind the motors' lag [N], (n,).
     """
 
@@ -106,7 +106,7 @@ class McapLog:
             angular_velocity_rad_s=part["rate"],
             tip_m=part["tip"],
             push_n=float(part["push"][0]),
-            friction_n=part["friction"],
+            friction_n=part["friction"][1:],
             thrusts_n=thrusts,
         )
         log.write("/truth/state", encode(row), stamp_ns)

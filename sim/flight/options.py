@@ -125,6 +125,9 @@ def pilot_config(scene: Scene, options: FlightOptions, config: PilotConfig | Non
     )
     vision = dataclasses.replace(config.vision, paint_color=paint.color, brush_width_m=paint.brush_width_m)
     controller = dataclasses.replace(config.controller, vehicle=calibrated(config.controller.vehicle, scene, options))
+    limits = controller.limits
+    if paint.trim_deg > limits.trim_deg:
+        controller = dataclasses.replace(controller, limits=dataclasses.replace(limits, trim_deg=paint.trim_deg))
     if options.compiled and controller.solver.name == "osqp":  # the others have no C code
         controller = controller.on_backend("compiled")
     return dataclasses.replace(

@@ -7,6 +7,7 @@ except for motors that are much slower than the vehicle's.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -15,7 +16,7 @@ import numpy as np
 from allocation import WrenchFacets, worst_level_reach
 from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.frames import GRAVITY, rotation_from_vector
+from ibvs_qp.frames import GRAVITY, rotation_from_quaternion
 from ibvs_qp.model.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.painting.pattern import PLACE_TOLERANCE_M, ROWS
@@ -26,7 +27,7 @@ from sim.world.clearance import PropellerClearance
 from sim.world.crash import GROUND_CLEARANCE_M
 from sim.world.mjcf import STEP_NS
 from sim.world.scene import ImuScene, Scene
-from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_YAW_DEG
+from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_RIGHT_M, START_YAW_DEG, facing
 
 #: Neighbouring strokes come locally up to 7 mm farther apart than nominal (14 pairs of strokes of 0.6 and 0.8 m in the
 #: world datasheet, from the sensor model of lines); this much overlap leaves a little of it [m].
@@ -45,6 +46,10 @@ LARGEST_LAG_RATIO = 2.0
 #: values of completed flights, 0.95, 0.095 and 0.4 (2 seeds each in the world datasheet), and of failed ones: 1.9, 0.19
 #: and 0.8, under both laws.
 MOST_ACCEL_NOISE, MOST_GYRO_NOISE, MOST_ATTITUDE_NOISE_DEG = 1.2, 0.12, 0.5
+#: Largest variation of the start's tip by the seed, in the chart [m].
+START_M = START_DISTANCE_M, START_RIGHT_M, START_DOWN_M
+#: Distances of a start that are tried before a curved wall: first, last of a scene, step [m].
+DISTANCES_M = 0.15, 2.0, 0.01
 #: Time of a job in gusts over that of its strokes alone [-]: most of them are painted again in the harsh world.
 AGAIN = 2.0
 
@@ -71,7 +76,7 @@ def job_problems(scene: Scene, config: PilotConfig, features: str = "rendered", 
     if features == "rendered":
         problems += _colours(scene, config)
     if not isinstance(job or PaintJob(), PaintJob):
-        return problems
+        return problems if BoardGeometry(scene).surface.flat else [*problems, *_start(BoardGeometry(scene), config)]
     overlap = list(_overlap(scene))
     if overlap:  # without a distance between strokes none of them has a place
         return problems + overlap
@@ -132,14 +137,28 @@ def _start(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:
         allowed, reason = f"allowed is at most {start.down_m - sunk:.3g} m", "the vehicle starts above the ground"
         bottom = "board.bottom_m", board.scene.board.bottom_m, "m"
         yield _problem("start.down_m", start.down_m, "m", allowed, reason, bottom)
-    clearance, tip = PropellerClearance(board, vehicle), np.add(board.start_tip, (START_DISTANCE_M, 0.0, 0.0))
-    turns = [rotation_from_vector((0.0, 0.0, math.radians(start.yaw_deg + k * START_YAW_DEG))) for k in (-1, 1)]
-    places = [tip - turn @ np.array(vehicle.tip_position_m) for turn in turns]
-    near = -min(clearance.distance(place, turn) for place, turn in zip(places, turns, strict=True))
+    clearance = PropellerClearance(board, vehicle)
+    near = -_start_clearance(board, config, clearance, start.distance_m)
     if near >= 0.0:
         allowed, reason = f"allowed is at least {start.distance_m + near:.3g} m", "no propeller starts at the wall"
+        if not board.surface.flat:
+            ways = np.arange(*DISTANCES_M).tolist()
+            clear = [way for way in ways if _start_clearance(board, config, clearance, way) > 0.0]
+            allowed = f"allowed is [{clear[0]:.3g}, {clear[-1]:.3g}] m" if clear else "allowed is no value"
         yaw = "start.yaw_deg", start.yaw_deg, "deg"
         yield _problem("start.distance_m", start.distance_m, "m", allowed, reason, yaw)
+
+
+def _start_clearance(board: BoardGeometry, config: PilotConfig, clearance: PropellerClearance, way: float) -> float:
+    """Least distance of a propeller to board or wall at a start so far away, for any seed [m]."""
+    nearest, varied = board.scene.start.distance_m - way, itertools.product((-1.0, 1.0), repeat=3)
+    shifts = {(1.0, 0.0, 0.0)} if board.surface.flat else varied  # a flat wall is nearest for the nearest tip
+    poses = (
+        facing(board, config.controller.vehicle, np.add((nearest, 0.0, 0.0), np.multiply(shift, START_M)), turn)
+        for shift in shifts
+        for turn in (-START_YAW_DEG, START_YAW_DEG)
+    )
+    return min(clearance.distance(place, rotation_from_quaternion(attitude)) for place, attitude in poses)
 
 
 def _views(board: BoardGeometry, config: PilotConfig) -> Iterator[str]:

@@ -67,6 +67,11 @@ class World:
         if (self.stream or self._features).rests(now):
             return self.sensors.sample(plant)
         position, quaternion, *motion = self._seen_from
+        if self.stream is None:  # lines are reported as tangents at the tip
+            place = np.array((0.0, *self.plant.tip_on_wall))
+            surface = self.geometry.surface
+            position, quaternion = surface.flattened(position, quaternion, place)
+            self._features.curvature = None if surface.flat else surface.curvature_tensor(place)
         pose, seen = self._mount.pose(position, quaternion), [self._mount.velocity(part) for part in motion]
         if self.stream is None:
             return self.sensors.sample(plant, None, self._mount.features(self._features.tick(now, *pose, *seen)))

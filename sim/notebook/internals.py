@@ -15,13 +15,10 @@ from ibvs_qp.pilot.painting.command import PainterInput, PaintingCommand
 from ibvs_qp.pilot.painting.config import PaintingConfig
 from ibvs_qp.pilot.painting.painter import Painter
 from ibvs_qp.pilot.painting.presser import Presser
-from ibvs_qp.qp.exact import ExactSolver
-from ibvs_qp.qp.solvers.osqp import osqp_settings
+from ibvs_qp.qp.solver import ProgramValues
 
 #: A flight at the wall ends after this time in any case [s].
 LONGEST_S = 10.0
-#: Arrays of the engine's data that define one solve.
-_ARRAYS = ("p", "q", "a", "lower", "upper", "free")
 
 #: Measurement and reference of one tick.
 Tick = tuple[Measurement, Reference]
@@ -70,16 +67,12 @@ class WallJob:
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    r"""The quadratic program of one tick, :math:`\min \tfrac12 x^T P x + q^T x, \; l \le A x \le h, \; x = (u, s)`."""
+    """The quadratic program of one tick."""
 
-    hessian: np.ndarray  # P, (variables, variables)
-    q: np.ndarray  # (variables,)
-    rows: np.ndarray  # A, (rows, variables)
-    lower: np.ndarray  # l, (rows,)
-    upper: np.ndarray  # h, (rows,)
+    values: ProgramValues  # its non-zeros and bounds
+    unlimited: np.ndarray  # its solution without limits, (variables,)
     free: np.ndarray  # thrusts without limits [N], (n,)
     limited: bool  # whether they violate a limit
-    arrays: tuple[np.ndarray, ...]  # the engine's own data, for `shipped_solver`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,18 +92,12 @@ class TickRecord:
 def record_program(controller: HybridController) -> Program:
     """Program of the controller's last tick."""
     data = controller.engine.data
-    hessian, rows, q = data.hessian(), data.rows(), data.q.copy()
-    lower, upper = data.lower.copy(), data.upper.copy()
-    at = rows[:, : len(data.free)] @ data.free
+    at = data.rows()[:, : len(data.free)] @ data.free
     return Program(
-        hessian=hessian,
-        q=q,
-        rows=rows,
-        lower=lower,
-        upper=upper,
+        values=ProgramValues(*(getattr(data, name).copy() for name in ProgramValues._fields)),
+        unlimited=data.unlimited.copy(),
         free=data.free.copy(),
-        limited=bool(((at < lower) | (at > upper)).any()),
-        arrays=tuple(getattr(data, name).copy() for name in _ARRAYS),
+        limited=bool(((at < data.lower) | (at > data.upper)).any()),
     )
 
 
@@ -151,6 +138,8 @@ def _selected_thrusts(controller: HybridController) -> np.ndarray:
         target = [*(line.analytic_command for line in setpoints.lines), level.angle_command]
         inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
         acceleration = acceleration + inverse @ (np.array(target) - matrix @ acceleration)
+    turning = contact * setpoints.turning_lever.dot(acceleration[3:]) / vehicle.mass_kg
+    acceleration[:3] -= setpoints.normal * turning  # in contact the push accelerates the tip
     return setpoints.inverse @ (mass @ acceleration - setpoints.bias_wrench)
 
 
@@ -168,32 +157,14 @@ def paper_profile(weight: float) -> ControllerConfig:
     return replace(printed, weights=weights, line_profile="paper", barriers=False)
 
 
-def exact_solver() -> Callable[[Program], tuple[np.ndarray, np.ndarray]]:
-    """DAQP through CasADi, the exact fallback of the controller: a function that returns x and multipliers y."""
-    solver = ExactSolver(HybridController().problem)
-
-    def solve(program: Program) -> tuple[np.ndarray, np.ndarray]:
-        found = solver.solve(*program.arrays[:5])
-        if found is None:
-            raise RuntimeError("a recorded program has no solution")
-        return found.x, found.y
-
-    return solve
-
-
 def shipped_solver() -> Callable[[Program], Answer]:
-    """The controller's engine with the shipped settings, on recorded data."""
+    """The controller's engine with the shipped settings, on recorded programs."""
     engine = HybridController().engine
 
     def solve(program: Program) -> Answer:
-        for name, values in zip(_ARRAYS, program.arrays, strict=True):
+        for name, values in (program.values._asdict() | {"unlimited": program.unlimited}).items():
             getattr(engine.data, name)[:] = values
         found = engine.solve()
         return (None, 0) if found is None else (found.x, found.iterations)
 
     return solve
-
-
-def shipped_osqp_settings() -> dict[str, float]:
-    """The shipped settings of OSQP, under OSQP's own names."""
-    return osqp_settings(ControllerConfig().solver)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from pathlib import Path
 from typing import Any
@@ -13,31 +12,27 @@ import polars as pl
 from ibvs_qp.config.errors import ConfigError
 from sim.evaluate.figures import FIGURES as FIGURES_BY_NAME
 from sim.evaluate.figures import MORE, Figure
-from sim.experiments.design import Choice
-from sim.experiments.design import designs as experiment_runs
+from sim.experiments.design import Choice, design
+from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace, law_name
-from sim.notebook.noise_sample import SAMPLE, WORLD, sample_runs
 from sim.notebook.table import table
 from sim.sweep.design import Run
 from sim.sweep.figures.page import read_table
 from sim.sweep.fingerprint import code_hash, configuration_hash
 from sim.sweep.paired import paired_differences, sign
 from sim.sweep.parts import PARAM
-from sim.sweep.spec import LAWS
 from sim.sweep.statistics import completed, needed, select
 from sim.world.worlds import DEFAULT_WORLD
 
+#: Table that the notebook reads by default, and the spec of its flights for `ibvs-qp experiment`.
+SAMPLE = Path(__file__).parents[2] / "notebooks" / "data" / "noise_sweep.parquet"
+SPEC = SAMPLE.with_name("noise_sample.toml")
 #: Columns of the two noises.
 VS, FORCE = PARAM + "sigma_vs", PARAM + "sigma_f_n"
 #: Camera distance in contact [m]: sigma_vs times this is the noise of a line on the wall.
 DEPTH_M = 0.5
-#: More seeds per cell than any sweep of this design has.
-MOST_SEEDS = 10
-#: By the sign of analytic law minus QP law in a figure that should be small.
-_VERDICTS = {1: "QP better", 0: "no significant difference", -1: "analytic law better"}
-
-
+#: Figures of merit that the notebook offers.
 FIGURES = tuple(
     FIGURES_BY_NAME[name]
     for name in (
@@ -45,38 +40,19 @@ FIGURES = tuple(
         *("limited_share", "duration_s"),
     )
 )
-
-
-def read_sweep(file: str) -> pl.DataFrame:
-    """Table of a noise sweep; without a file name the sample of the notebooks.
-
-    Raises:
-        ConfigError: When there is no such file, or it is no noise sweep.
-    """
-    sweep, _ = read_table(Path(file) if file else SAMPLE)
-    if missing := [name for name in (VS, FORCE) if name not in sweep.columns]:
-        raise ConfigError(f"{file} is no noise sweep: it lacks {', '.join(missing)}")
-    return sweep
+#: By the sign of analytic law minus QP law in a figure that should be small.
+_VERDICTS = {1: "QP better", 0: "no significant difference", -1: "analytic law better"}
 
 
 def sweep_or_sample(file: str) -> tuple[pl.DataFrame, str]:
-    """The table of a file and "", or the sample and the error."""
+    """The table of a noise sweep and "", or the sample and the error; the sample without a file name."""
     try:
-        return read_sweep(file), ""
+        sweep, _ = read_table(Path(file) if file else SAMPLE)
+        if missing := [name for name in (VS, FORCE) if name not in sweep.columns]:
+            raise ConfigError(f"{file} is no noise sweep: it lacks {', '.join(missing)}")
     except ConfigError as error:
-        return read_sweep(""), f"{error}. The page shows the sample."
-
-
-def grid_of(sweep: pl.DataFrame) -> tuple[list[float], list[float]]:
-    """Values of sigma_vs and of sigma_f, ascending."""
-    return sorted(sweep[VS].unique()), sorted(sweep[FORCE].unique())
-
-
-def cell_values(sweep: pl.DataFrame, law: str, vs: float, force: float, figure: Figure) -> np.ndarray:
-    """Figure of the completed flights of a cell, in the unit of its label."""
-    if figure.name not in sweep.columns:
-        return np.array([])
-    return figure.scale * completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), figure.name)
+        return read_table(SAMPLE)[0], f"{error}. The page shows the sample."
+    return sweep, ""
 
 
 def success(sweep: pl.DataFrame) -> pl.DataFrame:
@@ -87,17 +63,13 @@ def success(sweep: pl.DataFrame) -> pl.DataFrame:
 
 def success_table(sweep: pl.DataFrame) -> str:
     """Completed flights of each cell and the reasons of the others, as markdown."""
-    sigmas, forces = grid_of(sweep)
-    counts = {(row["law"], row[VS], row[FORCE]): row for row in success(sweep).to_dicts()}
-    rows = []
-    for law in LAWS:
-        for vs in sigmas:
-            cells = (counts.get((law, vs, force)) for force in forces)
-            texts = (f"{c['completed'] * c['flights']:.0f} of {c['flights']}" if c else "–" for c in cells)
-            rows.append((law_name(law), f"{vs:g}", *texts))
+    words = pl.format("{} of {}", (pl.col("completed") * pl.col("flights")).round().cast(int), "flights")
+    cells = success(sweep).with_columns(words.alias("words"))
+    wide = cells.pivot(FORCE, index=["law", VS], values="words").sort("law", VS, descending=[True, False])
+    rows = [(law_name(law), f"{vs:g}", *(text or "–" for text in texts)) for law, vs, *texts in wide.rows()]
     reasons = sweep.filter(~pl.col("completed")).group_by("law", "reason").len().sort("len", "law", descending=True)
     failed = "; ".join(f"{count} × {law_name(law)}: {reason}" for law, reason, count in reasons.head(6).rows())
-    header = ["law", "sigma_vs", *(f"sigma_f {force:g} N" for force in forces)]
+    header = ["law", "sigma_vs", *(f"sigma_f {float(force):g} N" for force in wide.columns[2:])]
     return table(header, rows) + f"\n\nNot completed: {failed or 'none'}."
 
 
@@ -111,19 +83,20 @@ def effects(sweep: pl.DataFrame, law: str, figure: Figure) -> dict[str, float]:
         scatter of log y that sigma_vs alone, sigma_f alone, and not even both explain: ``vs_part``, ``force_part`` and
         ``rest``. NaN with too few flights.
     """
+    import pandas as pd
+    from statsmodels.formula.api import ols
+
     flown = sweep.filter((pl.col("law") == law) & pl.col("completed") & (pl.col(figure.name) > 0.0))
-    logs = flown.select(pl.col(figure.name).log().alias("y"), pl.col(VS).log(), pl.col(FORCE).log())
-    y, vs, force = logs.to_numpy().T
-    if len(y) <= 3 or min(np.ptp(y), np.ptp(vs), np.ptp(force)) == 0.0:
-        return {"flights": len(y), **dict.fromkeys(("vs", "force", "vs_part", "force_part", "rest"), math.nan)}
-    slope = np.linalg.lstsq(np.column_stack((np.ones(len(y)), vs, force)), y, rcond=None)[0]
-
-    def explained(*groups: str) -> float:
-        means = logs.select(pl.col("y").mean().over(groups)).to_series().to_numpy()
-        return float(means.var() / y.var())
-
-    parts = {"vs_part": explained(VS), "force_part": explained(FORCE), "rest": 1.0 - explained(VS, FORCE)}
-    return {"flights": len(y), "vs": float(slope[1]), "force": float(slope[2]), **parts}
+    logs = flown.select(
+        pl.col(figure.name).log().alias("y"), pl.col(VS).log().alias("vs"), pl.col(FORCE).log().alias("f")
+    )
+    if logs.height <= 3 or min(logs[name].n_unique() for name in logs.columns) == 1:
+        return {"flights": logs.height, **dict.fromkeys(("vs", "force", "vs_part", "force_part", "rest"), math.nan)}
+    data = pd.DataFrame(logs.to_dict(as_series=False))
+    slopes = ols("y ~ vs + f", data).fit().params
+    vs, force, both = (float(ols(f"y ~ {terms}", data).fit().rsquared) for terms in ("C(vs)", "C(f)", "C(vs) * C(f)"))
+    parts = {"vs_part": vs, "force_part": force, "rest": 1.0 - both}
+    return {"flights": logs.height, "vs": float(slopes["vs"]), "force": float(slopes["f"]), **parts}
 
 
 def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float], dict[float, float]]:
@@ -135,13 +108,14 @@ def averaged_samples(sweep: pl.DataFrame, law: str) -> tuple[dict[float, float],
         Pictures behind the path error per sigma_vs, and force samples behind the push error per sigma_f; NaN without
         flights.
     """
-    (path, push), (sigmas, forces) = FIGURES[:2], grid_of(sweep)
+    sigmas, forces = (sorted(sweep[name].unique()) for name in (VS, FORCE))
 
-    def count(noise: float, values: np.ndarray) -> float:
+    def count(noise: float, metric: str, vs: float, force: float) -> float:
+        values = completed(select(sweep, law=law, sigma_vs=vs, sigma_f_n=force), metric)
         return (noise / float(np.median(values))) ** 2 if len(values) else math.nan
 
-    pictures = {vs: count(vs * DEPTH_M * path.scale, cell_values(sweep, law, vs, forces[0], path)) for vs in sigmas}
-    return pictures, {force: count(force, cell_values(sweep, law, sigmas[0], force, push)) for force in forces}
+    pictures = {vs: count(vs * DEPTH_M, "path_rms_m", vs, forces[0]) for vs in sigmas}
+    return pictures, {force: count(force, "force_rms_n", sigmas[0], force) for force in forces}
 
 
 def differences_table(sweep: pl.DataFrame, figure: Figure) -> str:
@@ -166,19 +140,16 @@ def row_name(row: dict[str, Any]) -> str:
 
 
 def find_run(row: dict[str, Any]) -> Run:
-    """The run of a row: the one with its configuration, otherwise the same cell of the sample.
+    """The run of a row: the one with its configuration, otherwise the same cell of the first design that has it.
 
     Raises:
         LookupError: When no design has such a cell, law and seed.
     """
-    designs = [sample_runs(MOST_SEEDS)]
-    choices = itertools.product(("geometric", "rendered"), (DEFAULT_WORLD, WORLD))
-    designs += [experiment_runs("noise-sweep", Choice(features=features, world=world)) for features, world in choices]
     key = (row["law"], row["seed"], row[VS], row[FORCE])
     alike = [
         run
-        for design in designs
-        for run in design
+        for name, world in ((str(SPEC), "ideal"), ("noise-sweep", "ideal"), ("noise-sweep", DEFAULT_WORLD))
+        for run in design(experiment(name), Choice(features="geometric", world=world))
         if (run.law, run.seed, run.params["sigma_vs"], run.params["sigma_f_n"]) == key
     ]
     if not alike:

@@ -12,8 +12,7 @@ from sim.world.readout import PLACES
 from sim.world.scene import BarometerScene
 from sim.world.slow_noise import SlowNoise
 
-#: Velocity downwards in the readings.
-_SINK = PLACES["velocity"].stop - 1
+_SINK = PLACES["sink"].start
 
 
 class Barometer:

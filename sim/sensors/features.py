@@ -62,6 +62,9 @@ class GeometricFeatures:
     Lines: the board's edges (kind "board") and the outer edges of the painted strokes where no later stroke and no
     brush covers them (kind "paint"; their surface side is the unpainted board).
 
+    Attributes:
+        curvature: Of the wall before the tip, as reported, or None.
+
     Args:
         scene: Board, paint job, camera, and ``features.sigma_vs``.
         vehicle: Where camera, arm and brush are.
@@ -79,6 +82,7 @@ class GeometricFeatures:
         noise: bool = True,
     ) -> None:
         self.scene, self.vehicle, self._noise = scene, vehicle, noise
+        self.curvature: np.ndarray | None = None
         self._edges = painted.edges if isinstance(painted, Canvas) else painted
         self._geometry = BoardGeometry(scene)
         self.intrinsics = camera_intrinsics(scene.camera)
@@ -169,6 +173,7 @@ class GeometricFeatures:
             velocity=velocity,
             velocity_covariance=_VELOCITY_COVARIANCE,
             velocity_stamp_ns=stamp_ns,
+            curvature=self.curvature,
         )
         return add_sigma_vs(frame, self.scene.features.sigma_vs, self._extra) if self._noise else frame
 

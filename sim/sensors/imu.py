@@ -27,11 +27,12 @@ class Imu:
 
     Args:
         scene: Rate, noise and biases of the scene.
+        world: Quaternion of the world in NED, (4,).
         errors: Further errors of the world.
         seed: Seed of the flight.
     """
 
-    def __init__(self, scene: ImuScene, errors: WorldErrors, seed: int) -> None:
+    def __init__(self, scene: ImuScene, world: np.ndarray, errors: WorldErrors, seed: int) -> None:
         self._clock = SampleClock(scene.rate_hz)
         root = math.sqrt(scene.rate_hz)
         attitude = stream(seed, "attitude")
@@ -39,7 +40,8 @@ class Imu:
         size = math.radians(scene.attitude_bias_deg)
         tilt = size * math.cos(direction), size * math.sin(direction)
         sigmas = math.radians(scene.attitude_noise_deg), scene.gyro_density * root, scene.accel_density * root
-        self._settings = np.array((*sigmas, *tilt, math.cos(0.5 * yaw), math.sin(0.5 * yaw), 1.0))
+        ned = multiply((math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)), world.tolist())
+        self._settings = np.array((*sigmas, *tilt, *ned, 1.0))
         self._noise = NormalRows((attitude, stream(seed, "gyro"), stream(seed, "accelerometer")), 3)
         self._kick, self._sample = np.zeros(9), np.zeros(10)
         self._errors = ImuErrors(errors, scene.rate_hz, seed) if ImuErrors.present(errors) else None
@@ -68,14 +70,14 @@ class Imu:
 @functools.cache
 def imu_function() -> ca.Function:
     """Function of (readings, nine normal numbers, settings) yielding attitude, angular velocity and specific force."""
-    truth, kick, settings = ca.SX.sym("truth", SIZE), ca.SX.sym("kick", 9), ca.SX.sym("settings", 8)
+    truth, kick, settings = ca.SX.sym("truth", SIZE), ca.SX.sym("kick", 9), ca.SX.sym("settings", 10)
     # The one is a symbol: CasADi folds a literal's division into the products, which rounds differently.
-    spread, gyro, accel, tilt_x, tilt_y, yaw_w, yaw_z, one = (settings[index] for index in range(8))
+    spread, gyro, accel, tilt_x, tilt_y, *ned, one = (settings[index] for index in range(10))
     quaternion, rate, felt = (truth[PLACES[name]] for name in ("quaternion", "rate", "felt"))
     vector = tilt_x + spread * kick[0], tilt_y + spread * kick[1], spread * kick[2]
     x, y, z = (0.5 * entry for entry in vector)
     length = ca.sqrt(one + x * x + y * y + z * z)
     turn = one / length, x / length, y / length, z / length
-    attitude = multiply((yaw_w, 0.0, 0.0, yaw_z), multiply([quaternion[index] for index in range(4)], turn))
+    attitude = multiply(ned, multiply([quaternion[index] for index in range(4)], turn))
     sample = ca.vertcat(*attitude, rate + gyro * kick[3:6], felt + accel * kick[6:9])
     return ca.Function("imu", [truth, kick, settings], [ca.densify(sample)])

@@ -9,6 +9,7 @@ from ibvs_qp.measurement import FeatureFrame, RgbdFrame, SensorFrame
 from sim.sensors.barometer import Barometer
 from sim.sensors.force_torque import ForceTorque
 from sim.sensors.imu import Imu
+from sim.world.board import BoardGeometry
 from sim.world.plant import Plant
 from sim.world.scene import Scene
 
@@ -38,7 +39,7 @@ class SensorSuite:
 
     def __init__(self, scene: Scene, vehicle: VehicleParams | None = None, seed: int = 0) -> None:
         self.vehicle = vehicle or VehicleParams()
-        self.imu = Imu(scene.imu, scene.errors, seed)
+        self.imu = Imu(scene.imu, BoardGeometry(scene).attitude, scene.errors, seed)
         self.force_torque = ForceTorque(scene.force_torque, scene.errors.force_torque, self.vehicle, seed)
         self.models: list[SensorModel] = [self.imu, self.force_torque]
         if scene.barometer.fitted:

@@ -45,7 +45,7 @@ class SweepSettings:
     features: str = choice("geometric", "sensor model of lines, or rendered pictures", ("geometric", "rendered"))
     vision: str = choice("own", "perception of rendered pictures", ("own", "paper"))
     scene: str = setting("", "scene file, in the folder of the spec; empty is the default scene")
-    world: str = setting("", "ideal, datasheet, harsh or a file; empty: the scene file's errors, else datasheet")
+    world: str = setting("", "ideal, datasheet, harsh, field or a file; empty: the scene file's errors, else datasheet")
     preset_qp: str = setting("", "preset of the QP law, in the folder of the spec; empty is the shipped one")
     preset_paper: str = setting("", "preset of the analytic law")
     seed: int = setting(0, "first seed", low=0, high=2**31 - 1)

@@ -79,8 +79,8 @@ class OutsideView:
     """
 
     def __init__(self, trace: Trace, camera: OutsideCamera) -> None:
-        self._trace, self._vehicle = trace, flown_vehicle(trace)
-        self._shape = VehicleShape.of(trace, self._vehicle)
+        self._trace = trace
+        self._shape = VehicleShape.of(trace, flown_vehicle(trace))
         self._canvas = Canvas(trace.scene, trace.seed, _BOARD_PX_M)
         self._geometry = BoardGeometry(trace.scene)
         self._rasterizer = Rasterizer(camera)
@@ -92,7 +92,7 @@ class OutsideView:
         """Picture at a tick, not before that of the last call: uint8 RGB (height, width, 3)."""
         self._paint(tick)
         self._backdrop.refresh()
-        drawer, shape, pose = self._rasterizer, self._shape, vehicle_pose(self._trace, self._vehicle, tick)
+        drawer, shape, pose = self._rasterizer, self._shape, vehicle_pose(self._trace, tick)
         drawer.clear(self._backdrop.colour)
         points = shape.points @ pose[:3, :3].T + pose[:3, 3]
         dark = []
@@ -131,12 +131,12 @@ def flown_vehicle(trace: Trace) -> TrueVehicle:
     return true_vehicle(trace.scene, config.controller.vehicle, trace.seed)
 
 
-def vehicle_pose(trace: Trace, vehicle: TrueVehicle, tick: int) -> np.ndarray:
+def vehicle_pose(trace: Trace, tick: int) -> np.ndarray:
     """Homogeneous transform of MuJoCo's body frame into its world at a tick, (4, 4)."""
     rotation = rotation_from_quaternion(trace.attitude[tick])
     pose = np.eye(4)
     pose[:3, :3] = FLIP[:, None] * rotation * FLIP
-    pose[:3, 3] = FLIP * (trace.tip[tick] - rotation @ np.array(vehicle.tip_position_m))
+    pose[:3, 3] = FLIP * trace.position[tick]
     return pose
 
 
@@ -150,6 +150,6 @@ def scene_points(trace: Trace) -> np.ndarray:
     rotors = FLIP * vehicle.geometry.positions
     rotors = rotors * (1.0 + vehicle.propeller_radius_m / np.linalg.norm(rotors, axis=1, keepdims=True))
     for tick in np.linspace(0, len(trace.t) - 1, _PLACES).astype(int):
-        pose = vehicle_pose(trace, vehicle, tick)
+        pose = vehicle_pose(trace, tick)
         points.append(rotors @ pose[:3, :3].T + pose[:3, 3])
     return np.concatenate(points)

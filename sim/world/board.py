@@ -1,8 +1,10 @@
 """Position of board and nominal strokes in the world (truth; no input of the controller).
 
-World NED with the wall to the north: x points into the wall, y to the right for the vehicle, z down. The
-board's face is the plane x = 0, its bottom left corner the point y = 0, z = -bottom_m; the wall's face lies at
-x = gap_m. Points on the board are given as (along, up) metres from that corner, turned with the board's slope.
+World: x points into the wall along its normal in the middle of the board, y to the right for the vehicle, z down along
+the wall. For an upright wall this is NED with the wall to the north; a leaning one turns gravity, and with it NED,
+about y. A place on the wall is given by its chart (`sim.world.surfaces`), which for a flat wall is the world itself:
+the board's face at x = 0, its bottom left corner at y = 0, z = -bottom_m, the wall's face at x = gap_m. Points on the
+board are given as (along, up) metres from that corner, turned with the board's slope.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 
 from ibvs_qp.pilot.painting.pattern import ROWS, Pattern, stroke_count, stroke_place
 from sim.world.scene import Scene
+from sim.world.surfaces import KINDS, Surface
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,41 @@ class BoardGeometry:
     """Geometry of board and paint job derived from a scene."""
 
     scene: Scene
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Shape of the wall."""
+        board = self.scene.board
+        middle = self.point(0.5 * board.width_m, 0.5 * board.height_m)
+        return KINDS[self.scene.surface.kind](middle, self.scene.surface)
+
+    @cached_property
+    def down(self) -> np.ndarray:
+        """Unit vector of gravity in the world, (3,)."""
+        lean = math.radians(self.scene.surface.lean_deg)
+        return np.array([math.sin(lean), 0.0, math.cos(lean)])
+
+    @cached_property
+    def attitude(self) -> np.ndarray:
+        """Quaternion (w, x, y, z) of the world in NED, (4,)."""
+        half = 0.5 * math.radians(self.scene.surface.lean_deg)
+        return np.array([math.cos(half), 0.0, -math.sin(half), 0.0])
+
+    @cached_property
+    def from_ned(self) -> np.ndarray:
+        """Rotation from NED to the world, (3, 3)."""
+        sine, _, cosine = self.down.tolist()
+        return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+
+    def bearing(self, place: np.ndarray) -> float:
+        """Yaw that faces the wall at a place of the chart (3,) [rad], + to the right."""
+        north, east, _ = self.from_ned.T @ self.surface.axes(place)[:, 0]
+        return math.atan2(east, north)
+
+    @property
+    def ground(self) -> float:
+        """Height of the ground: the points with ``down @ point`` of this [m]; the corner stays at its height."""
+        return self.scene.board.bottom_m * (1.0 - self.down[2])
 
     @cached_property
     def along(self) -> np.ndarray:
@@ -133,7 +171,7 @@ class BoardGeometry:
 
     @property
     def start_tip(self) -> np.ndarray:
-        """World position of the tip at the start of a flight without seed variation [m], (3,)."""
+        """Chart of the tip at the start of a flight without seed variation [m], (3,)."""
         start = self.scene.start
         y, z = self.point(*self.from_pattern(np.array((self.stroke_ends[0], self.stroke_place(1)))))
         return np.array([-start.distance_m, y + start.right_m, z + start.down_m])

@@ -140,6 +140,12 @@ class Canvas:
         self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
+    def thumbnail(self, pixels_per_m: float) -> np.ndarray:
+        """Painted fraction in 255ths at a coarser resolution, uint8."""
+        self._draw_stamps()
+        part = pixels_per_m / self.pixels_per_m
+        return cv2.resize(_inner(self._coverage), None, fx=part, fy=part, interpolation=cv2.INTER_AREA)
+
     def stroke(self, previous: BoardPoint | None, current: BoardPoint) -> None:
         """Move the pressed round brush from ``previous`` to ``current``, or dab it down where ``previous`` is None.
 
@@ -245,5 +251,6 @@ def _brush_stamps(radius_px: float) -> list[list[np.ndarray]]:
         for column in offsets:
             distance = np.sqrt((grid[:, None] - row) ** 2 + (grid[None, :] - column) ** 2)
             line.append(np.rint(255.0 * np.clip(radius_px + 0.5 - distance, 0.0, 1.0)).astype(np.uint8))
+            line[-1].flags.writeable = False  # shared by all flights
         stamps.append(line)
     return stamps

@@ -33,7 +33,7 @@ class PropellerClearance:
     def __init__(self, board: BoardGeometry, vehicle: VehicleParams) -> None:
         geometry = vehicle.geometry
         self._size = np.array([board.scene.board.width_m, board.scene.board.height_m])
-        self._gap = board.scene.board.gap_m
+        self._gap, self._surface = board.scene.board.gap_m, board.surface
         self._radius = vehicle.propeller_radius_m
         self._positions, self._axes = geometry.positions, geometry.axes
         self._rims = np.stack([self._rim(p, t) for p, t in zip(self._positions, self._axes, strict=True)])
@@ -55,9 +55,11 @@ class PropellerClearance:
 
     def strikes(self, position: Sequence[float], rotation: Sequence[Sequence[float]]) -> bool:
         """Whether any disc touches board or wall."""
+        where, turn = np.array(position), np.array(rotation)
+        if not self._surface.flat:
+            return self.distance(where, turn) <= 0.0
         if position[0] + self.reach <= 0.0:
             return False
-        where, turn = np.array(position), np.array(rotation)
         return self.foremost(where, turn) > 0.0 and self.distance(where, turn) <= 0.0
 
     def distances(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
@@ -71,6 +73,8 @@ class PropellerClearance:
         return np.concatenate([np.zeros(0), *(self._block(positions[block], rotations[block]) for block in blocks)])
 
     def _block(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        if not self._surface.flat:
+            return self._before_curve(positions, rotations)
         axes, hubs = self._axes @ rotations[:, 0].T, self._positions @ rotations[:, 0].T
         fronts = positions[:, 0] + hubs + self._radius * np.sqrt(np.maximum(1.0 - axes * axes, 0.0))
         to_board = np.zeros((3, 3))  # from the world to (x, along, up) of the board
@@ -81,6 +85,14 @@ class PropellerClearance:
         inside = (along >= 0.0) & (along <= width) & (up >= 0.0) & (up <= height)
         ahead = np.where(inside, x, -math.inf).max(axis=0)
         return np.minimum(self._gap - fronts.max(axis=0), -ahead)
+
+    def _before_curve(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """The same before a curved wall, by the rims alone."""
+        rims = self._rims.reshape(-1, 3) @ np.moveaxis(rotations, 1, 2) + positions[:, None, :]
+        chart = self._surface.chart(rims)
+        along_up = (chart[..., 1:] - self._corner) @ self._outline
+        inside = ((along_up >= 0.0) & (along_up <= self._size)).all(axis=-1)
+        return (np.where(inside, 0.0, self._gap) - chart[..., 0]).min(axis=1)
 
     def distance(self, position: np.ndarray, rotation: np.ndarray) -> float:
         """Smallest distance of any disc to the surface straight ahead of it [m]; negative inside a surface.

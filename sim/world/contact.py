@@ -25,7 +25,7 @@ STICK_RATE = 100.0
 #: implicit in the velocity and there is one contact, so Euler steps without a search for islands cost a seventh less;
 #: constraint types that the model lacks are disabled.
 OPTION_XML = (
-    '<option timestep="0.001" gravity="0 0 -{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
+    '<option timestep="0.001" gravity="{gravity}" integrator="Euler" cone="elliptic" impratio="10" '
     'solver="Newton" jacobian="dense" noslip_iterations="3"><flag autoreset="disable" island="disable" '
     'equality="disable" frictionloss="disable" limit="disable" spring="disable" damper="disable" clampctrl="disable" '
     'eulerdamp="disable"/></option>'
@@ -57,6 +57,18 @@ def set_contact(model: mujoco.MjModel, *, stiffness: float, damping: float, fric
     model.pair_solimp[pair] = (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)
     model.pair_friction[pair] = (friction, friction, 0.0, 0.0, 0.0)
     model.pair_margin[pair] = model.pair_gap[pair] = 0.0
+
+
+def set_stiffness(model: mujoco.MjModel, stiffness: float) -> None:
+    """Change the stiffness of a model's contact pair [N/m]."""
+    pair, scale = _pair(model)
+    model.pair_solref[pair, 0] = -stiffness * scale
+
+
+def set_friction(model: mujoco.MjModel, friction: float) -> None:
+    """Change the Coulomb coefficient of a model's contact pair."""
+    pair, _ = _pair(model)
+    model.pair_friction[pair, :2] = friction
 
 
 def contact_stiffness(model: mujoco.MjModel) -> float:

@@ -24,32 +24,37 @@ TOUCHDOWN_TILT_DEG = 25.0
 _TOUCHDOWN_COSINE = math.cos(math.radians(TOUCHDOWN_TILT_DEG))
 
 
-def has_landed(position: Sequence[float], rotation: Sequence[Sequence[float]], sink: float) -> bool:
+def has_landed(depth: float, upright: float, sink: float) -> bool:
     """Whether a vehicle touches the ground slowly and level: a landing, not a crash.
 
     Args:
-        position: Body origin, world NED [m], (3,).
-        rotation: Rows of the rotation B to I, (3, 3).
+        depth: Of the body origin below the ground, < 0 above it [m].
+        upright: Cosine of its tilt.
         sink: Its velocity downwards [m/s].
     """
-    level, low = rotation[2][2] >= _TOUCHDOWN_COSINE, position[2] > -GROUND_CLEARANCE_M
-    return low and level and sink <= TOUCHDOWN_SINK_M_S
+    return depth > -GROUND_CLEARANCE_M and upright >= _TOUCHDOWN_COSINE and sink <= TOUCHDOWN_SINK_M_S
 
 
 def crash_reason(
-    position: Sequence[float], rotation: Sequence[Sequence[float]], clearance: PropellerClearance
+    position: Sequence[float],
+    rotation: Sequence[Sequence[float]],
+    depth: float,
+    upright: float,
+    clearance: PropellerClearance,
 ) -> str | None:
     """Why a vehicle at this pose has crashed, or None.
 
     Args:
-        position: Body origin, world NED [m], (3,).
+        position: Body origin, world [m], (3,).
         rotation: Rows of the rotation B to I, (3, 3).
+        depth: Of the body origin below the ground, < 0 above it [m].
+        upright: Cosine of its tilt.
         clearance: Its propeller discs before board and wall.
     """
     if not math.isfinite(sum(position) + sum(map(sum, rotation))):
         return "non-finite state"
-    if rotation[2][2] < FLIP_COSINE:
+    if upright < FLIP_COSINE:
         return f"flip: tilted by more than {FLIP_DEG:g} deg"
-    if position[2] > -GROUND_CLEARANCE_M:
+    if depth > -GROUND_CLEARANCE_M:
         return "hit the ground"
     return "propeller strike" if clearance.strikes(position, rotation) else None

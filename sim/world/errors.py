@@ -129,6 +129,52 @@ class TimingErrors(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AirErrors(Checked):
+    """Wind of a flight, and air that wall and ground shape; each is drawn from the seed."""
+
+    wind_m_s: float = _size("mean wind up to this, in a random level direction", "m/s", 20.0)
+    shear: float = _size("exponent of the mean wind over height", "", 1.0)
+    gust_n: tuple[float, float] = setting(
+        (0.0, 0.0), "least and largest rms of the gust force per axis", unit="N", low=0.0, high=20.0
+    )
+    front_m_s: float = _size("change of the mean wind as a front passes, in a random level direction", "m/s", 20.0)
+    front_rise_s: float = setting(0.5, "time of that change", unit="s", low=0.0, high=60.0)
+    front_every_s: float = setting(15.0, "mean time between fronts", unit="s", low=1.0, high=1e4)
+    wall_thrust: float = _size("relative change of a rotor's thrust at 0.3 radii from the wall, up to this", "", 0.5)
+    ground_thrust: float = _size("relative gain of a rotor's thrust at 0.3 radii above the ground, up to this", "", 0.5)
+    recirculation: float = _size("relative thrust noise at 0.3 radii from the wall, standard deviation", "", 0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmErrors(Checked):
+    """A flexible arm: tool and brush swing about the force/torque sensor."""
+
+    mode_hz: float = _size("frequency of the swing of a free tip at a clamped vehicle, 0 for a rigid arm", "Hz", 200.0)
+    damping: float = setting(0.02, "its damping ratio", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrushErrors(Checked):
+    """Bristles and paint instead of a spring."""
+
+    progression_per_mm: float = _size("relative growth of the stiffness with the penetration", "1/mm", 5.0)
+    hysteresis: float = _size("relative stiffness more when pressed, and less when released", "", 0.9)
+    static_friction: float = _size("relative friction more while the brush sticks", "", 3.0)
+    drag_n_s_m: float = _size("viscous drag of wet paint along the wall", "N s/m", 200.0)
+    drying_s: float = setting(20.0, "time on the wall in which the drag falls by 1/e", unit="s", low=0.1, high=1e4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReliefErrors(Checked):
+    """Rivets, seams and steps of the board, drawn from the seed."""
+
+    rivets_per_m2: float = _size("rivets", "1/m^2", 200.0)
+    seams_per_m: float = _size("upright seams per length", "1/m", 20.0)
+    height_m: tuple[float, float] = setting((0.001, 0.004), "least and largest height", unit="m", low=0.0, high=0.02)
+    step_m: float = _size("height of an upright step", "m", 0.02)
+
+
+@dataclass(frozen=True, kw_only=True)
 class WorldErrors:
     """All errors of a world."""
 
@@ -141,6 +187,10 @@ class WorldErrors:
     camera: CameraErrors = field(default_factory=CameraErrors)
     depth: DepthErrors = field(default_factory=DepthErrors)
     timing: TimingErrors = field(default_factory=TimingErrors)
+    air: AirErrors = field(default_factory=AirErrors)
+    arm: ArmErrors = field(default_factory=ArmErrors)
+    brush: BrushErrors = field(default_factory=BrushErrors)
+    relief: ReliefErrors = field(default_factory=ReliefErrors)
 
 
 def world_names() -> list[str]:

@@ -2,8 +2,8 @@
 
 Body frame: origin at the ASSUMED centre of mass, axes front-left-up. The vehicle is one body without its tool, and
 the tool beyond the force/torque sensor is a rigid child, so that the sensor reads exactly the tool's load; together
-they have the scene's mass, centre of mass and inertia. World: x into the wall, y left, z up; the board's face is
-the plane x = 0, its bottom left corner lies at y = 0 (see `sim.world.board`).
+they have the scene's mass, centre of mass and inertia. World: x into the wall, y left, z up along it; the board's face
+is the plane x = 0, its bottom left corner lies at y = 0 (see `sim.world.board`).
 """
 
 # MuJoCo's bindings carry no types.
@@ -18,6 +18,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
+from sim.world.board import BoardGeometry
 from sim.world.contact import OPTION_XML, pair_xml, set_contact
 from sim.world.drawn_shape import tool_xml, vehicle_xml
 from sim.world.face import TIP_RADIUS_M
@@ -38,7 +39,9 @@ class ModelIds:
     """Indices of bodies and sensors in the compiled model."""
 
     vehicle: int  # body of the vehicle without tool
+    tool: int  # body of the tool
     face: int  # geom of the contact plane
+    tip: int  # geom of the tip's sphere
     accelerometer: slice  # slice of ``sensordata``: specific force at the body origin, front-left-up [m/s^2]
     force: slice  # slice: force of the vehicle on the tool, front-left-up [N]
     torque: slice  # slice: the moment at the force/torque sensor [N m]
@@ -100,6 +103,29 @@ def _surroundings_xml(scene: Scene) -> str:
       contype="0" conaffinity="0"/>"""
 
 
+def _option_xml(scene: Scene) -> str:
+    option = OPTION_XML.format(gravity=numbers(GRAVITY * FLIP * BoardGeometry(scene).down))
+    return option.replace('spring="disable" damper="disable" ', "") if scene.errors.arm.mode_hz else option
+
+
+def _swing_xml(scene: Scene, vehicle: TrueVehicle) -> str:
+    """Pitch and yaw of a flexible arm about the force/torque sensor; straight while the tool hangs level."""
+    errors = scene.errors.arm
+    if not errors.mode_hz:
+        return ""
+    tool, rate = tool_body(vehicle), 2.0 * math.pi * errors.mode_hz
+    lever = tool.centre - np.asarray(vehicle.force_torque_position_m)
+    inertia = float(tool.inertia[1, 1]) + tool.mass * float(lever @ lever)
+    stiffness, damping = inertia * rate**2, 2.0 * errors.damping * inertia * rate
+    place = numbers(FLIP * vehicle.force_torque_position_m)
+    sag = tool.mass * GRAVITY * float(lever[0]) / stiffness  # the spring's turn upwards that carries the tool
+    return "".join(
+        f'<joint name="{name}" type="hinge" axis="{axis}" pos="{place}" stiffness="{numbers(stiffness)}" '
+        f'damping="{numbers(damping)}" springref="{numbers(spring)}"/>'
+        for name, axis, spring in (("arm_pitch", "0 1 0", -sag), ("arm_yaw", "0 0 1", 0.0))
+    )
+
+
 def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True) -> str:
     """MJCF text of the world; contact numbers follow after compilation, see `build_model`.
 
@@ -115,7 +141,7 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
         surroundings, body, tool = _surroundings_xml(scene), vehicle_xml(vehicle), tool_xml(vehicle, scene)
     return f"""<mujoco model="ibvs_qp">
   <compiler angle="radian" balanceinertia="true" autolimits="true"/>
-  {OPTION_XML.format(gravity=numbers(GRAVITY))}
+  {_option_xml(scene)}
   <statistic extent="1"/>
   <worldbody>
     <geom name="face" type="plane" size="0 0 1" zaxis="-1 0 0" contype="0" conaffinity="0" group="3"/>
@@ -128,6 +154,7 @@ def build_xml(scene: Scene, vehicle: TrueVehicle, steps: int, drawn: bool = True
       {body}
       <body name="tool">
         {inertial_xml(tool_body(vehicle))}
+        {_swing_xml(scene, vehicle)}
         <site name="force_torque" pos="{numbers(sensor)}" quat="{numbers(turn)}"/>
         {tool}
         <geom name="tip" type="sphere" pos="{numbers(sphere)}" size="{numbers(TIP_RADIUS_M)}" contype="0"
@@ -175,5 +202,6 @@ def build_model(
         slices[name] = slice(start, start + int(model.sensor_dim[sensor]))
         # Layout: two numbers of MuJoCo's own, the stamps, a ring of samples; after a whole tick the oldest is first.
         remembered.append(int(model.sensor_historyadr[sensor]) + 2 + steps)
-    face = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "face")
-    return model, ModelIds(vehicle=body, face=face, **slices, remembered=tuple(remembered))
+    face, tip = (mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in ("face", "tip"))
+    tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "tool")
+    return model, ModelIds(vehicle=body, tool=tool, face=face, tip=tip, **slices, remembered=tuple(remembered))

@@ -16,21 +16,23 @@ from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.crash import crash_reason, has_landed
 from sim.world.errors import RotorErrors
-from sim.world.face import Face
+from sim.world.face import TIP_RADIUS_M, Face
 from sim.world.mjcf import STEP_NS, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
-from sim.world.random_streams import stream
 from sim.world.readings import PlantReadings
 from sim.world.readout import PLACES, SIZE, drive, readout
 from sim.world.rotor_errors import ThrustFactors
 from sim.world.scene import Scene
+from sim.world.touch import Touch
 from sim.world.trim import hover_thrusts, start_pose
 from sim.world.true_vehicle import true_vehicle
+from sim.world.wall_air import WallAir
 from sim.world.wind import Wind
 
 #: Crash reason after a non-finite command; physics stops from then on.
 NOT_FINITE = "non-finite thrust command"
-_SAFE, _SINK, _TIP = PLACES["safe"].start, PLACES["velocity"].stop - 1, PLACES["tip"]
+_SAFE, _TIP, _FRICTION = PLACES["safe"].start, PLACES["tip"], PLACES["friction"]
+_FALL = slice(PLACES["depth"].start, PLACES["upright"].stop)
 
 
 class Plant(PlantReadings):
@@ -46,7 +48,7 @@ class Plant(PlantReadings):
         landed: Whether it is over because the vehicle touched down.
         wind: The air; its mean may be changed in flight.
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
-        outer_force: Force at the true centre of mass in addition to that of the air, world NED [N], or None.
+        outer_force: Force at the true centre of mass in addition to that of the air, NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
         pushes: Normal contact force at every physics step of the last tick [N], likewise.
         tick_ns: The control tick [ns].
@@ -73,13 +75,19 @@ class Plant(PlantReadings):
         self.model, self._ids = build_model(scene, self.vehicle, self._steps, drawn)
         self.data = mujoco.MjData(self.model)
         self._lower, self._upper = self.vehicle.thrust_min, self.vehicle.thrust_max
-        board = BoardGeometry(scene)
+        self._board = board = BoardGeometry(scene)
         self.clearance = PropellerClearance(board, self.vehicle)
-        self._face = Face(board, self.model.geom_pos[self._ids.face])
+        face = self._ids.face
+        self._flexible = scene.errors.arm.mode_hz > 0.0
+        self._face = Face(board, self.model.geom_pos[face], self.model.geom_quat[face])
+        self._touch = Touch(board, self._face, self.model, self._ids, seed)
         drag = self.vehicle.linear_drag_n_s_m
-        self.wind = Wind(scene.wind, drag, self.tick_ns * 1e-9, stream(seed, "wind"))
+        self.wind = Wind(scene.wind, scene.errors.air, board.from_ned, drag, self.tick_ns * 1e-9, seed)
         rotors, count = scene.errors.rotors, self.vehicle.geometry.count
         self._factors = ThrustFactors(rotors, count, self.tick_ns * 1e-9, seed) if rotors != RotorErrors() else None
+        air = scene.errors.air
+        disturbed = air.wall_thrust or air.ground_thrust or air.recirculation
+        self._wall_air = WallAir(air, board, self.vehicle, self.tick_ns * 1e-9, seed) if disturbed else None
         self.time_ns = 0
         self.crashed: str | None = None
         self.landed = False
@@ -92,12 +100,14 @@ class Plant(PlantReadings):
         model, data, ids, truth = self.model, self.data, self._ids, self.vehicle
         self._act = data.act
         centre = np.array(truth.com_offset_m)
-        points = np.concatenate((centre, truth.tip_position_m, [self.clearance.reach]))
+        board = self._board
+        reach = self.clearance.reach if board.surface.flat else math.inf  # then every tick looks for a strike
+        points = np.concatenate((centre, truth.tip_position_m, [reach], board.down[::2], [board.ground]))
         self.truth, self.pushes = np.zeros(SIZE), np.zeros(self._steps)
         self._centre_velocity = self.truth[PLACES["centre_velocity"]]
         self._read = BoundFunction(
             readout(model.nhistory, *ids.remembered, self._steps),
-            (data.qpos, data.qvel, data.history, points),
+            (data.qpos[:7], data.qvel[:6], data.history, points),  # a flexible arm has further ones
             (self.truth, self.pushes),
         )
         self._commanded, self._air, self._lags = np.zeros(model.nu), np.zeros(3), np.zeros(model.nu)
@@ -112,16 +122,30 @@ class Plant(PlantReadings):
             (data.ctrl, self._lags, data.xfrc_applied[ids.vehicle]),
         )
 
-    def _start(self, position: np.ndarray, yaw: float, thrusts: np.ndarray) -> None:
+    def _start(self, position: np.ndarray, attitude: np.ndarray, thrusts: np.ndarray) -> None:
         self.data.qpos[:3] = FLIP * position
-        self.data.qpos[3:7] = FLIP_QUATERNION * (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+        self.data.qpos[3:7] = FLIP_QUATERNION * attitude
         self.data.act[:] = self.data.ctrl[:] = thrusts
         mujoco.mj_forward(self.model, self.data)
         ids, sensed, history = self._ids, self.data.sensordata, self.data.history
         for start, place in zip(ids.remembered, (ids.accelerometer, ids.force, ids.torque, ids.contact), strict=True):
             now = sensed[place]
             history[start : start + self._steps * len(now)] = np.tile(now, self._steps)
+        self._sense()
+
+    def _sense(self) -> None:
+        """Read the state; tip and friction in the chart."""
         self._read()
+        surface = self._board.surface
+        if self._flexible:
+            mujoco.mj_kinematics(self.model, self.data)
+            tip, ahead = self.data.geom_xpos[self._ids.tip], self.data.geom_xmat[self._ids.tip][::3]
+            self.truth[_TIP] = FLIP * (tip + TIP_RADIUS_M * ahead)
+        if surface.flat:
+            return
+        chart = surface.chart(self.truth[_TIP])
+        self.truth[_FRICTION] = self.truth[_FRICTION] @ surface.axes(chart)
+        self.truth[_TIP] = chart
 
     def step(self, thrusts: np.ndarray) -> None:
         """Advance one control tick under constant commanded thrusts.
@@ -133,20 +157,31 @@ class Plant(PlantReadings):
             self.crashed, self.time_ns = self.crashed or NOT_FINITE, self.time_ns + self.tick_ns
             return
         commanded = thrusts * self.gain
-        self._commanded[:] = commanded if self._factors is None else commanded * self._factors.next()
-        self._air[:] = self.wind.force(self._centre_velocity.tolist())
+        if self._factors is not None:
+            commanded = commanded * self._factors.next()
+        if self._wall_air is not None:
+            commanded = commanded * self._wall_air.factors(self.position, self.rotation)
+        self._commanded[:] = commanded
+        self._air[:] = self.wind.force(self._centre_velocity.tolist(), -self.truth.item(_FALL.start))
         if self.outer_force is not None:
-            self._air += self.outer_force
+            self._air += self._board.from_ned @ self.outer_force
         self._drive()
         self._lag[:] = self._lags
         struck = self._face.follow(self.truth[_TIP].tolist())
-        mujoco.mj_step(self.model, self.data, self._steps)
+        if not self._touch.needed:
+            mujoco.mj_step(self.model, self.data, self._steps)
+        else:
+            for _ in range(self._steps):
+                self._touch.prepare(self.data)
+                mujoco.mj_step(self.model, self.data)
         self.time_ns += self.tick_ns
-        self._read()
+        self._sense()
         if self.truth.item(_SAFE) != 1.0 and not self.over:
+            depth, sink, upright = self.truth[_FALL].tolist()
             position, rotation = self.position.tolist(), self.rotation.tolist()
-            self.landed = has_landed(position, rotation, self.truth.item(_SINK))
-            self.crashed = None if self.landed else crash_reason(position, rotation, self.clearance)
+            self.landed = has_landed(depth, upright, sink)
+            crash = None if self.landed else crash_reason(position, rotation, depth, upright, self.clearance)
+            self.crashed = crash
         if struck and not self.over:
             self.crashed = struck
 
@@ -161,9 +196,27 @@ class Plant(PlantReadings):
         return self.landed or self.crashed is not None
 
     def displace(self, offset: np.ndarray) -> None:
-        """Move the vehicle at once by an offset in the world, NED [m], (3,): as if everything else had moved back."""
+        """Move the vehicle at once by an offset in the world [m], (3,): as if everything else had moved back."""
         self.data.qpos[:3] += FLIP * offset
-        self._read()
+        self._touch.jumped()
+        self._sense()
+
+    def set_wall(self, stiffness: float, friction: float) -> float:
+        """Another wall before the tip.
+
+        Args:
+            stiffness: Of the contact, that of the first touch of bristles [N/m].
+            friction: Coulomb coefficient, the sliding one of bristles.
+
+        Returns:
+            How much deeper the tip lies in the new wall under the same push at rest [m].
+        """
+        return self._touch.set_wall(stiffness, friction, self.tip)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit vector into the wall at the tip, world, (3,)."""
+        return self._board.surface.axes(self.tip)[:, 0]
 
     @property
     def thrust_limits(self) -> tuple[np.ndarray, np.ndarray]:

@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
+from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.readout import MOTION, PLACES
+from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle
 
-_PUSH, _TIP = PLACES["push"].start, PLACES["tip"]
+_PUSH, _TIP, _FRICTION = PLACES["push"].start, PLACES["tip"], PLACES["friction"]
 
 
 def _reading(name: str, text: str) -> property:
@@ -22,17 +24,19 @@ def _reading(name: str, text: str) -> property:
 class PlantReadings:
     """Pose, motion, forces and contact of a plant, each a copy."""
 
+    scene: Scene
     truth: np.ndarray
     pushes: np.ndarray
     vehicle: TrueVehicle
     clearance: PropellerClearance
     _act: np.ndarray
+    _board: BoardGeometry
 
     position = _reading("position", "Body origin (assumed centre of mass), world NED [m], (3,).")
     quaternion = _reading("quaternion", "Attitude (w, x, y, z) of B in I, (4,).")
     velocity = _reading("body_velocity", "Velocity of the body origin in B [m/s], (3,).")
     angular_velocity = _reading("rate", "Angular velocity in B [rad/s], (3,).")
-    tip = _reading("tip", "Undeformed tip, world NED [m], (3,); x > 0 is the penetration.")
+    tip = _reading("tip", "Undeformed tip in the wall's chart [m], (3,); x > 0 is the penetration.")
     specific_force = _reading(
         "felt", "Reading of a perfect accelerometer at the body origin, mean over the last tick, FRD [m/s^2], (3,)."
     )
@@ -40,7 +44,11 @@ class PlantReadings:
         "ft_wrench",
         "Perfect force/torque sensor: vehicle on tool, in its place and axes, last physics step [N, N m], (6,).",
     )
-    contact_friction = _reading("friction", "Force of the board on the tip along it, world NED (y, z) [N], (2,).")
+
+    @property
+    def contact_friction(self) -> np.ndarray:
+        """Force of the board on the tip along it (right, down) [N], (2,)."""
+        return self.truth[_FRICTION][1:].copy()
 
     @property
     def motion(self) -> np.ndarray:
@@ -54,14 +62,15 @@ class PlantReadings:
 
     @property
     def euler(self) -> np.ndarray:
-        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall, + to the right."""
-        (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = self.rotation.tolist()
+        """Roll, pitch, yaw [rad], (3,); yaw 0 faces the wall in the middle of the board, + to the right."""
+        ned = self._board.from_ned.T @ self.rotation
+        (forward_x, _, _), (forward_y, _, _), (forward_z, right_z, down_z) = ned.tolist()
         pitch = math.asin(max(-1.0, min(1.0, -forward_z)))
         return np.array([math.atan2(right_z, down_z), pitch, math.atan2(forward_y, forward_x)])
 
     @property
     def tip_on_wall(self) -> tuple[float, float]:
-        """World (y, z) of the tip [m] as plain numbers."""
+        """Chart (y, z) of the tip [m] as plain numbers."""
         _, y, z = self.truth[_TIP].tolist()
         return y, z
 

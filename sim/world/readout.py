@@ -22,11 +22,14 @@ READINGS = {
     "rotation": 9,  # B to I, row by row
     "body_velocity": 3,  # in B [m/s]
     "centre_velocity": 3,  # of the true centre of mass, world [m/s]
-    "tip": 3,  # world [m]
+    "tip": 3,  # world [m]; `Plant` replaces it by its chart, and friction by its parts there
     "felt": 3,  # specific force in B, mean of the tick [m/s^2]
     "ft_wrench": 6,  # vehicle on tool, FRD, at the last physics step [N, N m]
     "push": 1,  # normal contact force at the last physics step [N]
-    "friction": 2,  # on the tip, world (y, z), at the last physics step [N]
+    "friction": 3,  # on the tip along the wall, world, at the last physics step [N]
+    "depth": 1,  # of the body origin below the ground, < 0 above it [m]
+    "sink": 1,  # velocity of the body origin downwards [m/s]
+    "upright": 1,  # cosine of the tilt
     "safe": 1,  # 1 where no crash is possible
 }
 _STARTS = [sum(list(READINGS.values())[:index]) for index in range(len(READINGS) + 1)]
@@ -57,11 +60,11 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
         contact: See there.
         steps: Physics steps in a tick.
 
-    Points are the true centre of mass (3) and the tip (3) in B [m], and how far forward of the origin anything of the
-    vehicle but the tool reaches [m].
+    Points are the true centre of mass (3) and the tip (3) in B [m], how far forward of the origin anything of the
+    vehicle but the tool reaches [m], and the way down (x, z) in the world with the depth of the ground [m].
     """
     place, speed = ca.SX.sym("qpos", 7), ca.SX.sym("qvel", 6)
-    history, points = ca.SX.sym("history", size), ca.SX.sym("points", 7)
+    history, points = ca.SX.sym("history", size), ca.SX.sym("points", 10)
 
     def sensed(start: int, width: int, step: int) -> list[Any]:
         begin = start + width * (step % steps)
@@ -74,6 +77,11 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     rotation = rotation_rows(*quaternion)
     numbers = _entries(points)
     centre, tip, reach = numbers[:3], numbers[3:6], numbers[6]
+    down_x, down_z, ground = numbers[7:]
+
+    def downwards(vector: Any) -> Any:
+        return down_x * vector[0] + down_z * vector[2]
+
     swing = rotate(rotation, cross(rate, centre))
     felts = zip(*(sensed(accelerometer, 3, step) for step in range(steps)), strict=True)
     felt = [sum(samples[1:], samples[0]) for samples in felts]
@@ -82,12 +90,14 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     touches = [sensed(contact, 10, step) for step in range(steps)]
     pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
     found, _, first, second, *axes = touches[-1]
-    (_, ty, tz), (_, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])
-    # Minus the force on the board, in NED: the two signs of y and z cancel.
-    friction = [ca.if_else(found < 1.0, 0.0, value) for value in (first * ty + second * sy, first * tz + second * sz)]
+    (tx, ty, tz), (sx, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])
+    # Minus the force on the board, in FRD: the two signs of y and z cancel.
+    along = -first * tx - second * sx, first * ty + second * sy, first * tz + second * sz
+    friction = [ca.if_else(found < 1.0, 0.0, value) for value in along]
     total = sum(position[1:], position[0]) + sum(sum(row[1:], row[0]) for row in rotation)
-    upright, high = rotation[2][2] >= FLIP_COSINE, position[2] <= -GROUND_CLEARANCE_M
-    safe = ca.logic_and(ca.logic_and(upright, high), ca.logic_and(position[0] + reach <= 0.0, ca.fabs(total) < _FINITE))
+    depth, upright = downwards(position) - ground, downwards([row[2] for row in rotation])
+    level = ca.logic_and(upright >= FLIP_COSINE, depth <= -GROUND_CLEARANCE_M)
+    safe = ca.logic_and(level, ca.logic_and(position[0] + reach <= 0.0, ca.fabs(total) < _FINITE))
     values = {
         "position": position,
         "velocity": velocity,
@@ -101,6 +111,9 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
         "ft_wrench": (fx, -fy, -fz, mx, -my, -mz),
         "push": (pushes[-1],),
         "friction": friction,
+        "depth": (depth,),
+        "sink": (downwards(velocity),),
+        "upright": (upright,),
         "safe": (safe,),
     }
     row = ca.vertcat(*(entry for name in READINGS for entry in values[name]))

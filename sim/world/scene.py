@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ibvs_qp.config.errors import out_of_range
 from ibvs_qp.config.settings import Checked, choice, load_toml, setting
 from ibvs_qp.measurement import SensorFrame, channels
 from ibvs_qp.pilot.painting.pattern import CORNERS, FILL, PATTERNS
 from sim.world.errors import WorldErrors
 from sim.world.plant_scene import PlantScene
+from sim.world.surfaces import KINDS, SIDES
 
 Color = tuple[int, int, int]
+#: Steepest wall: angle of its normal to the horizon [deg].
+STEEPEST_DEG = 15.0
+#: End of a board around a vertical axis: a quarter of the circumference from its middle [deg]; a chart ends at a half.
+WIDEST_DEG = 90.0
 #: Nominal rates and delays of the sensors.
 _SENSORS = channels(SensorFrame)
 _IMAGE, _WRENCH, _INERTIAL = _SENSORS["image"], _SENSORS["wrench"], _SENSORS["specific_force"]
@@ -32,6 +39,23 @@ class BoardScene(Checked):
     color: Color = setting((236, 236, 230), "board colour", low=0, high=255)
     clutter: int = setting(4, "distracting objects on and around the board", low=0, high=100)
     texture_seed: int = setting(0, "seed of textures and clutter, mixed with the flight's seed", low=0, high=2**31 - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceScene(Checked):
+    """The shape of wall and board; a plane has no radius."""
+
+    kind: str = choice("plane", "shape", tuple(KINDS))
+    lean_deg: float = setting(
+        0.0,
+        "lean in the middle of the board, + with the top away from the vehicle",
+        unit="deg",
+        low=-STEEPEST_DEG,
+        high=STEEPEST_DEG,
+    )
+    radius_m: float = setting(3.0, "radius", unit="m", low=1.5, high=1000.0)
+    axis: str = choice("vertical", "direction of the axis of a cylinder", ("vertical", "horizontal"))
+    side: str = choice("convex", "side of a cylinder that is painted: outside, or inside as in a tank", SIDES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +85,7 @@ class PaintScene(Checked):
     overlap_m: float = setting(0.008, "overlap of neighbouring strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push force", unit="N", low=0.5, high=40.0)
+    trim_deg: float = setting(0.0, "`limits.trim_deg` that the job permits", unit="deg", low=0.0, high=5.0)
 
     @property
     def pitch_m(self) -> float:
@@ -146,6 +171,7 @@ class Scene(Checked):
     """One complete scene; every section and key has a default."""
 
     board: BoardScene = field(default_factory=BoardScene)
+    surface: SurfaceScene = field(default_factory=SurfaceScene)
     wall: WallScene = field(default_factory=WallScene)
     paint: PaintScene = field(default_factory=PaintScene)
     start: StartScene = field(default_factory=StartScene)
@@ -157,6 +183,23 @@ class Scene(Checked):
     features: FeaturesScene = field(default_factory=FeaturesScene)
     wind: WindScene = field(default_factory=WindScene)
     errors: WorldErrors = field(default_factory=WorldErrors)
+
+    def __post_init__(self) -> None:
+        """A board around a cylinder ends where its normal is `STEEPEST_DEG` off level, or `WIDEST_DEG` aside."""
+        super().__post_init__()
+        surface, board = self.surface, self.board
+        if surface.kind != "cylinder":
+            return
+        if surface.axis == "horizontal":
+            name, size, end, way = "board.height_m", board.height_m, STEEPEST_DEG - abs(surface.lean_deg), "off level"
+            angle = STEEPEST_DEG
+        else:
+            name, size, end, way = "board.width_m", board.width_m, WIDEST_DEG, "aside"
+            angle = WIDEST_DEG
+        most = 2.0 * surface.radius_m * math.radians(end)
+        if size > most:
+            reason = f"where the normal of a wall of surface.radius_m = {surface.radius_m:g} m is {angle:g} deg {way}"
+            raise out_of_range(name, size, "m", f"allowed is at most {most:.3g} m, {reason}")
 
 
 def load_scene(file: str | Path) -> Scene:

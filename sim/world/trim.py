@@ -9,6 +9,7 @@ import numpy as np
 from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
+from ibvs_qp.quaternion import conjugate, multiply
 from sim.world.board import BoardGeometry
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
@@ -29,12 +30,27 @@ def hover_thrusts(vehicle: TrueVehicle) -> np.ndarray:
     )
 
 
-def start_pose(scene: Scene, vehicle: VehicleParams, seed: int) -> tuple[np.ndarray, float]:
-    """Start position of the body origin, world NED [m] (3,), and yaw [rad]; level, tip facing the wall."""
+def start_pose(scene: Scene, vehicle: VehicleParams, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Start position of the body origin [m] (3,) and quaternion of B in the world (4,); level, tip facing the wall."""
     distance, right, down, turn = stream(seed, "start").uniform(-1.0, 1.0, 4)
     offset = np.array([-distance * START_DISTANCE_M, right * START_RIGHT_M, down * START_DOWN_M])
-    tip = BoardGeometry(scene).start_tip + offset
-    yaw = math.radians(scene.start.yaw_deg + turn * START_YAW_DEG)
+    return facing(BoardGeometry(scene), vehicle, offset, turn * START_YAW_DEG)
+
+
+def facing(
+    board: BoardGeometry, vehicle: VehicleParams, offset: np.ndarray, turn_deg: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position of the body origin [m] (3,) and quaternion of B in the world (4,) of a level vehicle before the wall.
+
+    Args:
+        board: Wall and board with the start of the scene.
+        vehicle: Its tip is placed.
+        offset: Of the tip from the scene's start, in the chart [m], (3,).
+        turn_deg: Yaw from that of the scene's start [deg].
+    """
+    yaw = math.radians(board.scene.start.yaw_deg + turn_deg) + board.bearing(board.start_tip)
     x, y, z = vehicle.tip_position_m
-    arm = np.array([math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z])
-    return tip - arm, yaw
+    arm = board.from_ned @ (math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z)
+    level = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
+    tip = board.surface.points(board.start_tip + offset)
+    return tip - arm, np.array(multiply(conjugate(board.attitude.tolist()), level))

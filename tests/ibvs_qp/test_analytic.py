@@ -15,6 +15,7 @@ from controller_scenes import (
     attitude,
     line_references,
     measured,
+    moved_by_turn,
     random_tick,
     without_rotors,
 )
@@ -41,7 +42,7 @@ MASSES = np.array([MASS] * 3 + list(CONFIG.vehicle.inertia_kg_m2))
 
 def terms_of(seed: int, lines: int, weight: float, config: ControllerConfig = CONFIG) -> Setpoints:
     setpoints = analytic_setpoints(config)
-    setpoints.update(*random_tick(np.random.default_rng(seed), lines))
+    setpoints.update(*random_tick(np.random.default_rng(seed), lines, lean=0.2 * (seed % 2)))
     setpoints.step.inputs["contact_weight"][0] = weight
     evaluate_law(setpoints)
     return setpoints
@@ -80,18 +81,20 @@ def test_the_wrench_is_the_law_by_hand(lines: int, weight: float) -> None:
             inverse = np.linalg.pinv(matrix, rcond=0.05)
             acceleration = -inverse @ feedback + (np.eye(6) - inverse @ matrix) @ null
         servo = MASSES * acceleration
-        selection = np.zeros((6, 6))
-        selection[:3, :3] = weight * np.outer(normal, normal)
-        force = np.concatenate((normal * setpoints.push_command, np.zeros(3)))
-        expected = (np.eye(6) - selection) @ servo + selection @ force
+        tip = MASSES[:3] * (acceleration[:3] + moved_by_turn(setpoints, acceleration[3:]))
+        selection = weight * np.outer(normal, normal)
+        force = normal * setpoints.push_command
+        expected = servo + np.concatenate((selection @ (force - tip), np.zeros(3)))
         np.testing.assert_allclose(analytic_wrench(setpoints), expected, atol=1e-8)
 
 
 def test_full_contact_keeps_the_force_command() -> None:
-    """Lambda' = lambda n n^T: along n exactly the push remains. The printed R diag(0,0,lambda) would cancel it."""
+    """Lambda' = lambda n n^T: along n the push alone accelerates the tip. The printed R diag(0,0,lambda) cancels it."""
     for seed in range(10):
         setpoints = terms_of(seed, 2, 1.0)
-        assert setpoints.normal @ analytic_wrench(setpoints)[:3] == pytest.approx(setpoints.push_command, abs=1e-9)
+        wrench = analytic_wrench(setpoints)
+        along = setpoints.normal @ (wrench[:3] + MASS * moved_by_turn(setpoints, wrench[3:] / MASSES[3:]))
+        assert along == pytest.approx(setpoints.push_command, abs=1e-9)
         none = terms_of(seed, 0, 0.0)
         assert none.normal @ analytic_wrench(none)[:3] == pytest.approx(none.standoff_command, abs=1e-9)
 

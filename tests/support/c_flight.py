@@ -151,6 +151,7 @@ class CFlight:
             stamp_ns=stamp,
             has_plane=flag,
             plane=real * 4,
+            curvature=real * 3,
             has_velocity=flag,
             velocity=real * 3,
             velocity_covariance=real * 9,
@@ -219,7 +220,7 @@ class CFlight:
 
     def _packed(self, features: FeatureFrame) -> Any:
         own = self._features(stamp_ns=features.stamp_ns, velocity_stamp_ns=features.velocity_stamp_ns)
-        for name in ("plane", "velocity", "velocity_covariance"):
+        for name in ("plane", "curvature", "velocity", "velocity_covariance"):
             value = getattr(features, name)
             if value is not None:
                 getattr(own, name)[:] = np.ravel(value).tolist()

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.attitude import UNFILTERED_HZ
-from ibvs_qp.frames import R_BODY_CAMERA, cross
+from ibvs_qp.frames import R_BODY_CAMERA, cross, down_in_body
 from ibvs_qp.measurement import HORIZONTAL, VERTICAL, LineFeature, LineReference, Measurement, Reference
+from ibvs_qp.model.setpoints import Setpoints
 
 TICK_NS = 4_000_000
 #: The box that no command may leave, whatever is measured [N].
@@ -52,15 +53,22 @@ class Wall:
     """A wall as the body sees it: unit normal into it, distance of the tip along it, axes under gravity."""
 
     def __init__(
-        self, quaternion: np.ndarray, distance: float, turn: float = 0.0, config: ControllerConfig | None = None
+        self,
+        quaternion: np.ndarray,
+        distance: float,
+        turn: float = 0.0,
+        config: ControllerConfig | None = None,
+        lean: float = 0.0,
     ) -> None:
+        """``turn`` and ``lean`` are angles of the normal about and below the horizon [rad]."""
         vehicle = (config or DEFAULT).vehicle
         self.tip, self.camera = np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m)
         rotation = body_to_world(quaternion)
         self.distance = distance
         self.gravity = rotation.T @ np.array([0.0, 0.0, 1.0])
-        self.normal = rotation.T @ np.array([math.cos(turn), math.sin(turn), 0.0])
-        self.right = np.array(cross(self.gravity, self.normal))
+        level = np.array([math.cos(turn), math.sin(turn), 0.0])
+        self.normal = math.cos(lean) * rotation.T @ level + math.sin(lean) * self.gravity
+        self.right = np.array(cross(self.gravity, self.normal)) / math.cos(lean)
         self.down = np.array(cross(self.normal, self.right))
         self.foot = self.tip + distance * self.normal
 
@@ -90,6 +98,13 @@ class Wall:
             rho, theta = -rho, theta + math.pi
         fields = {"covariance": CERTAIN} | extra
         return LineFeature(rho=rho, theta=theta, role=role, weight=weight, **fields)  # type: ignore[arg-type]
+
+
+def moved_by_turn(setpoints: Setpoints, angular_acceleration: np.ndarray) -> np.ndarray:
+    """Acceleration of the tip along n by a turn of a body whose wall leans: n.d (d x r) . alpha, times n, (3,)."""
+    gravity, tip = down_in_body(setpoints.step.inputs["attitude"]), setpoints.config.vehicle.tip_position_m
+    along = setpoints.normal @ gravity * np.dot(gravity, np.cross(angular_acceleration, tip))
+    return setpoints.normal * along
 
 
 def image_line(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
@@ -124,7 +139,7 @@ def line_references(count: int, depth: float = 0.5) -> tuple[LineReference, ...]
 
 
 def random_tick(
-    rng: np.random.Generator, lines: int, tick: int = 0, heading: float = 0.0, flip: bool = False
+    rng: np.random.Generator, lines: int, tick: int = 0, heading: float = 0.0, flip: bool = False, lean: float = 0.0
 ) -> tuple[Measurement, Reference]:
     """A vehicle somewhere near its wall, moving, with the lines and references of a painting vehicle.
 
@@ -132,7 +147,7 @@ def random_tick(
     """
     roll, pitch, turn = (rng.normal(size=3) * (0.01, 0.01, 0.03)).tolist()
     quaternion = attitude(roll, pitch, heading)
-    wall = Wall(quaternion, float(rng.uniform(0.0, 0.08)), heading + turn)
+    wall = Wall(quaternion, float(rng.uniform(0.0, 0.08)), heading + turn, lean=lean)
     features = (
         wall.line(rng.normal(0.05, 0.02), 0.5 * math.pi + rng.normal(0, 0.02), HORIZONTAL, flip=flip),
         wall.line(rng.normal(-0.05, 0.02), rng.normal(0, 0.02), VERTICAL, flip=flip),

@@ -128,6 +128,7 @@ class PlaneMotion(WallMotion):
                 dt=signals.input("dt"),
                 force=signals.input("force", 3),
                 rate=signals.input("rate", 3),
+                shrinks=ca.DM.eye(2),  # a flat wall
             )
 
         self._predict = Block(build)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ibvs_qp.frames import rotation_from_quaternion
 from sim.evaluate.paint_plan import band_mask, nominal_plan
 from sim.flight.trace import Event, Trace
 from sim.world.board import BoardGeometry
@@ -107,7 +108,7 @@ def synthetic_trace(
     line[rows != 1, 1] = np.nan
     arrays = {
         "t": t,
-        "position": tip - [0.7, 0.0, 0.0],
+        "position": tip - rotation_from_quaternion(attitude) @ (0.7, 0.0, 0.0),
         "velocity": velocity,
         "attitude": np.tile(attitude, (count, 1)),
         "euler": np.tile(np.radians([errors.roll_deg, 0.0, errors.yaw_deg]), (count, 1)),

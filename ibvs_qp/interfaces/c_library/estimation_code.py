@@ -101,6 +101,7 @@ def write_estimation(
         "LEAST_RATIO": LEAST_RATIO,
         "ASSUMED_DISTANCE": ASSUMED_DISTANCE,
         "VELOCITY_BOUND": channels(FeatureFrame)["velocity"].high,
+        "CURVATURE_BOUND": channels(FeatureFrame)["curvature"].high,
         "ASYMMETRY": ASYMMETRY,
         "TIP_RIGHT": right,
         "TIP_BELOW": below,

@@ -134,7 +134,7 @@ def _frame(tick: FlightTick, single: bool) -> str:
 
 
 def _features(features: FeatureFrame, config: ControllerConfig, single: bool) -> str:
-    members = {name: getattr(features, name) for name in ("plane", "velocity", "velocity_covariance")}
+    members = {name: getattr(features, name) for name in ("plane", "curvature", "velocity", "velocity_covariance")}
     known = {f"has_{name}": members[name] is not None for name in ("plane", "velocity")}
     if features.velocity_covariance is not None:
         members["velocity_covariance"] = features.velocity_covariance.ravel()

@@ -21,6 +21,7 @@ OUTPUTS = (
     "normal",
     "contact_weight",
     "push_command",
+    "turning_lever",
     "bias_wrench",
     "thrust_lower",
     "thrust_upper",

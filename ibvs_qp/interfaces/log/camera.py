@@ -14,7 +14,7 @@ from ibvs_qp.interfaces.log.scene import CAMERA, DEPTH_CAMERA, Message, rgba
 from ibvs_qp.interfaces.log.writer import LogWriter, timestamp
 from ibvs_qp.interfaces.overlay import draw_overlay
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.perception_result import PerceptionResult
+from ibvs_qp.vision.perception import PerceptionResult
 from ibvs_qp.vision.picture.picture import denormalise
 
 #: Quality of the JPEGs [-]: no difference is visible, at 60 kB a picture of 640x480.

@@ -43,6 +43,14 @@ class Painter(Strategy):
     _COMPLETED = "all rows painted, retreated"
     _SLIDES = True  # whether a stroke follows the press
 
+    def adjust(self, push_n: float | None = None, speed_m_s: float | None = None) -> None:
+        """See `Strategy.adjust`."""
+        before = self.config.speed_m_s
+        super().adjust(push_n, speed_m_s)
+        if self.phase in ("paint", "retouch"):
+            self._way_s *= before / self.config.speed_m_s
+        self._tip.config = self.config
+
     def reset(self) -> None:
         """As after construction."""
         super().reset()

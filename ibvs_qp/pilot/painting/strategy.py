@@ -66,6 +66,16 @@ class Strategy(ABC):
         """Condition for which the phase waits, in words; empty for none that is known."""
         return ""
 
+    def adjust(self, push_n: float | None = None, speed_m_s: float | None = None) -> None:
+        """Change push [N] and painting speed [m/s] from the next tick on, also after `reset`; None leaves one as it is.
+
+        Raises:
+            ConfigError: When a value is out of range; nothing is changed then.
+        """
+        given = {"push_n": push_n, "speed_m_s": speed_m_s}
+        values = {name: value for name, value in given.items() if value is not None}
+        self.config = dataclasses.replace(self.config, **values)
+
     @abstractmethod
     def step(self, inputs: PainterInput) -> PaintingCommand:
         """Targets of one tick.

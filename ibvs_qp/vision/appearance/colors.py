@@ -6,23 +6,29 @@ import math
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import (
-    BOARD,
-    OTHER,
-    PAINT,
+from ibvs_qp.vision.appearance.light import (
+    BRIGHTEST,
+    CELL_BITS,
+    DIMMEST,
+    LIGHT_STEP,
     UNKNOWN,
-    LabelTables,
-    labels_of,
-    like_colors,
+    LightField,
+    fit_light,
     squared_distance,
 )
-from ibvs_qp.vision.appearance.light import BRIGHTEST, DIMMEST, LightField, fit_light
-from ibvs_qp.vision.medians import middle
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.compilation import inner, kernel, middle
+from ibvs_qp.vision.picture.layout import CoarseGrid
+from ibvs_qp.vision.picture.picture import Picture
 
-__all__ = ["BOARD", "OTHER", "PAINT", "SurfaceColors"]
-
+#: Labels of a colour.
+OTHER, BOARD, PAINT = 0, 1, 2
+#: Entries of one table, as a power of two, and steps of a channel.
+_TABLE_BITS, _SIDE = 15, 32
+#: Drift of the board that renews the tables, and the brightest that a channel can be [grey levels].
+_DRIFT, _WHITE = 1.5, 255.0
+#: A colour is another one in some light if this light is so much weaker or stronger, up to this fraction of the size of
+#: the colour and this distance [grey levels].
+_DIMMER, _BRIGHTER, _CHROMA, _GREY = 0.68, 1.4, 0.10, 14.0
 #: Fraction of a new sample in the board's running colour.
 _BLEND = 0.2
 #: Samples of the board whose median is taken, up to twice as many; more cost time and change nothing.
@@ -38,6 +44,101 @@ _PAINT_TINT = 0.6
 #: Light on the paint nearer than this to that in which it was named needs no correction [ln]: the gate holds it.
 _AS_NAMED = 0.08
 _NO_LEVELS = np.empty(0, np.uint8)
+
+
+@inner
+def label_of(table, level, red, green, blue):
+    """Label of a colour in light of some level."""
+    return table[(level << _TABLE_BITS) | (red >> 3) << 10 | (green >> 3) << 5 | blue >> 3]
+
+
+@inner
+def level_at(levels, width, u, v):
+    """Level of light at a pixel, of cells (rows * columns,); 0 in even light."""
+    if levels.size == 0:
+        return 0
+    columns = (width + (1 << CELL_BITS) - 1) >> CELL_BITS
+    return levels[(v >> CELL_BITS) * columns + (u >> CELL_BITS)]
+
+
+@kernel("u1[::1](u1[:, ::1], u1[::1], u1[::1])")
+def labels_of(colors, levels, table):
+    """Labels of colours (n, 3), each in light of its level (n,)."""
+    labels = np.empty(len(colors), np.uint8)
+    for i in range(len(colors)):
+        level = np.int64(levels[i]) if levels.size else 0
+        labels[i] = label_of(table, level, np.int64(colors[i, 0]), np.int64(colors[i, 1]), np.int64(colors[i, 2]))
+    return labels
+
+
+@inner
+def _squared_distance(red, green, blue, reference):
+    red, green, blue = red - reference[0], green - reference[1], blue - reference[2]
+    return red * red + green * green + blue * blue
+
+
+@kernel("u1[::1](u1[:, ::1], f4[::1], f4[::1], f8)")
+def like_colors(colors, board, paint, gate):
+    """Labels of colours (n, 3) within the gate of the board's, else of the paint's [grey levels], (n,)."""
+    labels, gate_squared = np.empty(len(colors), np.uint8), np.float32(gate * gate)
+    for i in range(len(colors)):
+        red, green, blue = np.float32(colors[i, 0]), np.float32(colors[i, 1]), np.float32(colors[i, 2])
+        painted = _squared_distance(red, green, blue, paint) < gate_squared
+        like = _squared_distance(red, green, blue, board) < gate_squared
+        labels[i] = BOARD if like else PAINT if painted else OTHER
+    return labels
+
+
+@kernel("u1[::1](f4[::1], f4[::1], f8)")
+def _label_table(board, paint, gate):
+    """One table: colours within the gate of the paint [grey levels] and not nearer to the board are paint."""
+    table, gate_squared = np.empty((_SIDE, _SIDE, _SIDE), np.uint8), np.float32(gate * gate)
+    center = np.arange(_SIDE).astype(np.float32) * np.float32(8.0) + np.float32(4.0)
+    for red in range(_SIDE):
+        for green in range(_SIDE):
+            row = table[red, green]
+            for blue in range(_SIDE):
+                to_board = _squared_distance(center[red], center[green], center[blue], board)
+                to_paint = _squared_distance(center[red], center[green], center[blue], paint)
+                painted = (to_paint < gate_squared) & (to_paint < to_board)  # no branches: vectorised
+                row[blue] = PAINT if painted else BOARD if to_board < gate_squared else OTHER
+    return table.reshape(-1)
+
+
+def _differ(one: np.ndarray | None, two: np.ndarray | None) -> bool:
+    """Whether two colours, known or not, differ by more than a drift."""
+    if one is None or two is None:
+        return one is not two
+    return one is not two and bool(np.abs(one - two).max() > _DRIFT)
+
+
+def alike_colors(colors: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """Whether colours uint8 (..., 3) are one colour (3,) in some light, bool (...)."""
+    found = _alike(np.ascontiguousarray(colors, float).reshape(-1, 3), np.ascontiguousarray(color, float))
+    return found.reshape(colors.shape[:-1])
+
+
+@kernel("b1[::1](f8[:, ::1], f8[::1])")
+def _alike(colors, color):
+    """The same for colours (n, 3), (n,)."""
+    found = np.empty(len(colors), np.bool_)
+    for k in range(len(colors)):
+        found[k] = is_alike(colors[k, 0], colors[k, 1], colors[k, 2], color)
+    return found
+
+
+@inner
+def is_alike(red, green, blue, color):
+    """Whether a colour is the colour (3,) in some light."""
+    size = max(math.sqrt(color[0] * color[0] + color[1] * color[1] + color[2] * color[2]), 1.0)
+    light = (red * color[0] + green * color[1] + blue * color[2]) / (size * size)
+    square = red * red + green * green + blue * blue
+    offset = max(square - (light * size) ** 2, 0.0)
+    gate = _CHROMA * size + _GREY
+    if light > _DIMMER and light < _BRIGHTER and offset < gate * gate:
+        return True
+    away = (light - 1.0) * size
+    return offset + away * away < _GREY * _GREY
 
 
 class SurfaceColors:
@@ -64,8 +165,10 @@ class SurfaceColors:
         """Forget the sampled colour of the board."""
         self.board = None if self._given is None else self._given.copy()
         self.paint = self._named
-        self._tables = LabelTables(self._gate)
         self.light: LightField | None = None
+        self._tables: dict[int, np.ndarray] = {}  # by the step of light, of these colours
+        self._tabled: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
+        self._joined, self._steps = np.zeros(0, np.uint8), ()
 
     def learn(self, colors: np.ndarray, component: np.ndarray) -> None:
         """Sample the board: median of the unpainted colours uint8 (rows, columns, 3) of the surface's samples.
@@ -86,22 +189,23 @@ class SurfaceColors:
         median = few[:, few.shape[1] // 2].copy()
         self.board = median if self.board is None else self.board + _BLEND * (median - self.board)
 
-    def learn_light(
-        self, samples: np.ndarray, places: np.ndarray, shape: tuple[int, int], intrinsics: Intrinsics
-    ) -> bool:
-        """Find how the light falls on the board, by colours (n, 3) at normalised places (n, 2); whether it is uneven.
+    def learn_light(self, picture: Picture, places: np.ndarray, beside_brush: np.ndarray) -> bool:
+        """Learn how the light falls on the board, and how bright the paint is in it; whether it is uneven.
 
-        The picture has a (height, width) [px].
+        Samples are taken from flat places all over the surface, (n,), and beside the brush, where paint is fresh, (m,).
         """
         if self.board is None:
             return False
-        fixed = self._given is not None
+        samples = picture.colors.reshape(-1, 3).take(places, axis=0)
+        where, fixed = picture.grid.design[:, :2].take(places, axis=0), self._given is not None
+        shape, paint = picture.mask.shape, self.paint
         found = fit_light(
-            samples, places, self.board, self._gate, shape, intrinsics, self.light, paint=self.paint, anchored=fixed
+            samples, where, self.board, self._gate, shape, picture.intrinsics, self.light, paint=paint, anchored=fixed
         )
         self.light = None if found is None else found[0]
         if found is not None and not fixed:
             self.board = found[1]
+        self.learn_paint(picture.grid, picture.colors, beside_brush)
         return found is not None
 
     def learn_paint(self, grid: CoarseGrid, colors: np.ndarray, places: np.ndarray) -> None:
@@ -126,35 +230,52 @@ class SurfaceColors:
             found = float(np.float32(middle(light[painted].astype(float))))
             self.paint = paint if abs(math.log(found)) < _AS_NAMED else np.float32(found) * paint
 
-    def forget_light(self) -> None:
-        """Forget how the light falls: its cells are those of one picture size."""
-        self.light = None
-
     @property
     def levels(self) -> np.ndarray:
         """Level of light in every cell of the picture, as kernels take them, uint8 (n,); empty where it is even."""
         return _NO_LEVELS if self.light is None else self.light.levels.reshape(-1)
 
     def label(self, colors: np.ndarray, u: np.ndarray | None = None, v: np.ndarray | None = None) -> np.ndarray:
-        """OTHER, BOARD or PAINT for colours uint8 (..., 3) at pixels, in their light; all OTHER for an unknown board.
+        """OTHER, BOARD or PAINT for colours uint8 (..., 3), all OTHER for an unknown board.
 
-        Args:
-            colors: The colours.
-            u: Columns of the pixels [px], (...); None for the light of the reference.
-            v: Rows of the pixels [px].
+        They are in the light at pixels, columns u and rows v [px], (...), or in that of the reference.
         """
         shape, levels = colors.shape[:-1], _NO_LEVELS
         if self.board is None:
             return np.zeros(shape, np.uint8)
         if self.light is not None and u is not None and v is not None:
-            levels = np.broadcast_to(self.light.levels_at(u, v), shape).flatten()
+            cells = self.light.levels
+            row, column = (
+                np.clip(np.asarray(at).astype(np.intp), 0, size - 1) >> CELL_BITS
+                for at, size in zip((v, u), self.light.shape, strict=True)
+            )
+            levels = np.broadcast_to(cells[row, column], shape).flatten()
         return labels_of(np.ascontiguousarray(colors).reshape(-1, 3), levels, self.table()).reshape(shape)
 
     def table(self) -> np.ndarray:
-        """Labels of all colours, one table after the other for every level of light; the board must be known."""
+        """Labels of all colours, one table after the other for every level of light, uint8 (levels * 32768,).
+
+        Red comes first; the board must be known. Tables are kept while the colours hold.
+        """
         assert self.board is not None
-        steps = _EVEN if self.light is None else self.light.steps
-        return self._tables.of(self.board, self.paint if self.paint_distinct else None, steps)
+        paint, steps = self.paint if self.paint_distinct else None, _EVEN if self.light is None else self.light.steps
+        if _differ(paint, self._tabled[1]) or _differ(self.board, self._tabled[0]):
+            self._tabled, self._steps = (self.board.copy(), paint), ()
+            self._tables.clear()
+        if self._steps != steps:
+            for step in steps:
+                if step not in self._tables:
+                    self._tables[step] = self._table_in(math.exp(LIGHT_STEP * step))
+            self._joined, self._steps = np.concatenate([self._tables[step] for step in steps]), steps
+        return self._joined
+
+    def _table_in(self, light: float) -> np.ndarray:
+        """The table of one level; gates shrink and grow with the light, as all differences of colours do."""
+        board, paint = (
+            UNKNOWN if color is None else np.minimum(np.float32(light) * color, np.float32(_WHITE))
+            for color in self._tabled
+        )
+        return _label_table(board, paint, self._gate * light)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for similar ones, uint8 (rows, columns)."""

@@ -7,10 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import CELL_BITS, LIGHT_STEP, squared_distance
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics
 
+#: Step between two levels of light [ln]: half of it is a seventh of the gate of a white board.
+LIGHT_STEP = 0.03
+#: Side of a cell of the picture with one level of light, as a power of two [px].
+CELL_BITS = 4
+#: A colour that no other one is near to.
+UNKNOWN = np.full(3, np.inf, np.float32)
 #: Light of samples in which board or paint could be at all, times that in which their colour is known.
 DIMMEST, BRIGHTEST = np.float32(0.4), np.float32(2.5)
 #: Fraction of the gate within which a colour is the surface's however coarse its label: labels are in steps of 8.
@@ -41,6 +45,13 @@ _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
 _UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
+
+
+def squared_distance(colors: np.ndarray, reference: np.ndarray | None) -> np.ndarray:
+    """Squared RGB distances of colours (..., 3) from a colour (..., 3), float32; infinite from an unknown one."""
+    reference = UNKNOWN if reference is None else reference
+    red, green, blue = (colors[..., k] - reference[..., k] for k in range(3))  # not at once: rows of three are slow
+    return red * red + green * green + blue * blue
 
 
 @dataclass(frozen=True)
@@ -77,12 +88,6 @@ class LightField:
         """Logarithm of the light at normalised places (..., 2)."""
         light = products(places / self.reach) @ self.terms
         return np.clip(light, max(self.range[0], -_LEVELS * LIGHT_STEP), min(self.range[1], _LEVELS * LIGHT_STEP))
-
-    def levels_at(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Level of light at pixels, uint8 of their shape."""
-        height, width = self.shape
-        row = np.clip(np.asarray(v).astype(np.intp), 0, height - 1) >> CELL_BITS
-        return self.levels[row, np.clip(np.asarray(u).astype(np.intp), 0, width - 1) >> CELL_BITS]
 
 
 def products(places: np.ndarray) -> np.ndarray:
@@ -165,17 +170,10 @@ def fit_light(
 def light_of(
     colors: np.ndarray, board: np.ndarray, paint: np.ndarray | None, gate: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """In which light the board would look like each sample.
+    """In which light the board would look like each sample, float32 (n, 3), times the reference's, (n,).
 
-    Args:
-        colors: Samples, float32 (n, 3).
-        board: Colour of the board in the light of the reference, float32 (3,).
-        paint: Colour of the paint or None: samples of it have not the board's tint.
-        gate: Distance within which a colour is the board's in that light.
-
-    Returns:
-        The light, times the reference's; which samples are cut off, which have the board's tint in some light or are
-        cut off, and which of these have its colour in the reference's light, (n,) each.
+    With it, (n,) each: which samples are cut off, which have the board's tint (3,) in some light or are cut off, and
+    which of these have its colour, within the gate, in the reference's light. The paint has not the board's tint.
     """
     (red, green, blue), (b_red, b_green, b_blue) = colors.T, board
     size = max(b_red * b_red + b_green * b_green + b_blue * b_blue, np.float32(1.0))
@@ -189,16 +187,6 @@ def light_of(
     even = tinted & (squared_distance(colors, np.minimum(board, _WHITE)) < np.float32((_SURE * gate) ** 2))
     even &= np.abs(light - np.float32(1.0)) < np.float32(_UNEVEN)
     return light, cut, tinted, even
-
-
-def on_surface(grid: CoarseGrid, depth: np.ndarray, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
-    """Those of flat places of samples, (n,), that lie on a surface by depth (H, W) alone, of any colour.
-
-    The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
-    """
-    u, v = (axis.take(places) for axis in grid.pixels)
-    z, design = depth[v, u], grid.design.take(places, axis=0)
-    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading
 
 
 def _left_by_two_materials(logarithm: np.ndarray, band: float) -> float:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
 
 from ibvs_qp.frames import R_BODY_CAMERA, align_line
-from ibvs_qp.vision.picture.lens import camera_matrix
-from ibvs_qp.vision.picture.mask import Intrinsics
-from ibvs_qp.vision.surface.plane import PlaneEstimate
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.picture.picture import camera_matrix, half_resolution
+from ibvs_qp.vision.surface.plane import PlaneEstimate, SurfaceRegion
 
 #: Least fraction of the distance to a surface that is left after a motion.
 _LEAST_LEFT = 0.05
@@ -72,61 +73,67 @@ class CameraMotion:
         return (rho, theta) if length < 1e-9 else align_line(-c / length, math.atan2(b, a), theta)
 
 
-def surface_motion(
-    before: np.ndarray,
-    now: np.ndarray,
-    factor: float,
-    cells: np.ndarray,
-    plane: PlaneEstimate,
-    intrinsics: Intrinsics,
-) -> CameraMotion | None:
-    """Motion of the camera by the points of a plane in view, or None where too few of them can be followed.
+class SurfaceMotion:
+    """Motion of the camera by points of the surface, where no gyro measures it."""
 
-    Args:
-        before: Brightness of the picture before, uint8 (h, w).
-        now: The same of this picture.
-        factor: Pixels of the full picture per pixel of these.
-        cells: Samples of the surface in the picture before, bool (rows, columns).
-        plane: Its plane there, which gives the points their depth.
-        intrinsics: (fx, fy, cx, cy) of the full picture [px].
-    """
-    mask = cv2.resize(cells.astype(np.uint8), before.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    corners = cv2.goodFeaturesToTrack(before, _POINTS, _QUALITY, _SPACING, mask=mask)
-    if corners is None or len(corners) < _LEAST:
-        return None
-    corners, search = np.asarray(corners, np.float32).reshape(-1, 1, 2), {"winSize": _WINDOW, "maxLevel": _LEVELS}
-    moved, found, _ = cv2.calcOpticalFlowPyrLK(before, now, corners, None, **search)  # type: ignore[call-overload]
-    back, again, _ = cv2.calcOpticalFlowPyrLK(now, before, moved, None, **search)  # type: ignore[call-overload]
-    good = (found.ravel() > 0) & (again.ravel() > 0)
-    good &= np.linalg.norm((back - corners).reshape(-1, 2), axis=1) < _RETURN_PX
-    if int(good.sum()) < _LEAST:
-        return None
-    shift = 0.5 * (factor - 1.0)
-    start = corners.reshape(-1, 2)[good].astype(float) * factor + shift
-    stop = moved.reshape(-1, 2)[good].astype(float) * factor + shift
-    fx, fy, cx, cy = intrinsics
-    rays = np.column_stack(((start[:, 0] - cx) / fx, (start[:, 1] - cy) / fy, np.ones(len(start))))
-    inverse = rays @ plane.inverse_depth
-    kept = inverse > 1e-3
-    points, stop = rays[kept] / inverse[kept, None], stop[kept]
-    if len(points) < _LEAST:
-        return None
-    solved, turn, shifted, agreeing = cv2.solvePnPRansac(
-        points,
-        stop,
-        camera_matrix(intrinsics),
-        None,  # type: ignore[arg-type]
-        rvec=np.zeros((3, 1)),
-        tvec=np.zeros((3, 1)),
-        useExtrinsicGuess=True,
-        iterationsCount=_ROUNDS,
-        reprojectionError=_AGREE_PX * factor,
-        flags=cv2.SOLVEPNP_ITERATIVE,
-    )
-    if not solved or agreeing is None or len(agreeing) < _LEAST:
-        return None
-    rotation = cv2.Rodrigues(turn)[0]  # P_now = rotation P_before + shifted
-    if not (np.isfinite(rotation).all() and np.isfinite(shifted).all()):
-        return None
-    turn = cv2.Rodrigues(R_BODY_CAMERA @ rotation.T @ R_BODY_CAMERA.T)[0].ravel()
-    return CameraMotion(rotation.T, -(rotation.T @ shifted).ravel(), turn, by_surface=True)
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the picture before."""
+        self._grey: np.ndarray | None = None
+
+    def motion_by_points(
+        self, frame: RgbdFrame, plane: PlaneEstimate | None, region: SurfaceRegion | None
+    ) -> CameraMotion | None:
+        """Motion since the picture before, or None where too few points can be followed.
+
+        The plane is the surface's in the picture before, which gives the points their depth, the region that of the
+        last search; None if unknown.
+        """
+        small, factor = half_resolution(frame.rgb)
+        now = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY)
+        before, self._grey = self._grey, now
+        if before is None or plane is None or region is None:
+            return None
+        mask = cv2.resize(region.cells.astype(np.uint8), before.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        corners = cv2.goodFeaturesToTrack(before, _POINTS, _QUALITY, _SPACING, mask=mask)
+        if corners is None or len(corners) < _LEAST:
+            return None
+        corners, search = np.asarray(corners, np.float32).reshape(-1, 1, 2), {"winSize": _WINDOW, "maxLevel": _LEVELS}
+        follow: Any = cv2.calcOpticalFlowPyrLK
+        moved, found, _ = follow(before, now, corners, None, **search)
+        back, again, _ = follow(now, before, moved, None, **search)
+        good = (found.ravel() > 0) & (again.ravel() > 0)
+        good &= np.linalg.norm((back - corners).reshape(-1, 2), axis=1) < _RETURN_PX
+        if int(good.sum()) < _LEAST:
+            return None
+        shift = 0.5 * (factor - 1.0)
+        start = corners.reshape(-1, 2)[good].astype(float) * factor + shift
+        stop = moved.reshape(-1, 2)[good].astype(float) * factor + shift
+        fx, fy, cx, cy = frame.intrinsics
+        rays = np.column_stack(((start[:, 0] - cx) / fx, (start[:, 1] - cy) / fy, np.ones(len(start))))
+        inverse = rays @ plane.inverse_depth
+        kept = inverse > 1e-3
+        points, stop = rays[kept] / inverse[kept, None], stop[kept]
+        if len(points) < _LEAST:
+            return None
+        solved, turn, shifted, agreeing = cv2.solvePnPRansac(
+            points,
+            stop,
+            camera_matrix(frame.intrinsics),
+            None,  # type: ignore[arg-type]
+            rvec=np.zeros((3, 1)),
+            tvec=np.zeros((3, 1)),
+            useExtrinsicGuess=True,
+            iterationsCount=_ROUNDS,
+            reprojectionError=_AGREE_PX * factor,
+            flags=cv2.SOLVEPNP_ITERATIVE,
+        )
+        if not solved or agreeing is None or len(agreeing) < _LEAST:
+            return None
+        rotation = cv2.Rodrigues(turn)[0]  # P_now = rotation P_before + shifted
+        if not (np.isfinite(rotation).all() and np.isfinite(shifted).all()):
+            return None
+        turn = cv2.Rodrigues(R_BODY_CAMERA @ rotation.T @ R_BODY_CAMERA.T)[0].ravel()
+        return CameraMotion(rotation.T, -(rotation.T @ shifted).ravel(), turn, by_surface=True)

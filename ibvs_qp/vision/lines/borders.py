@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import is_alike
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors, is_alike
 from ibvs_qp.vision.compilation import inner, kernel
+from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
-from ibvs_qp.vision.surface.region import SurfaceRegion, depth_gate
+from ibvs_qp.vision.surface.plane import SurfaceRegion, depth_gate
 
 #: Distances from the line at which depth is read [px at 640]. A depth camera moves a step by up to 20 px.
 _DEPTH_PX = np.array((3.0, 5.0, 8.0, 12.0, 18.0, 26.0, 36.0))
@@ -22,7 +24,14 @@ _CELLS_BEYOND, _SHARE_BEYOND = 2.0, 0.25
 #: looked for, and the fraction of them at which they must lie: prints, holes and corners are no samples.
 _CELLS_BESIDE, _PLACES_BESIDE, _MOSTLY = 1.5, 16, 0.75
 #: Places looked at along a line.
-PLACES = 32
+_PLACES = 32
+#: Distance from a segment at which its two sides are read for a first look [px at 640], and places along it.
+_LOOK_PX, _LOOKS = 4.0, 16
+#: Places along a segment at which the surface is looked for beside it; one beside which it lies for more than this
+#: fraction of its length stays whole, a shorter piece is left out [px at 640].
+_PLACES_TRIM, _WHOLE, _SHORTEST_PX = 48, 0.95, 40.0
+#: Samples this far apart are near each other: two cells.
+_NEAR_CELLS = np.ones((5, 5), np.uint8)
 #: Length with half the score of a long line [px at 640].
 _HALF_LENGTH_PX = 12.0
 #: A border this long, as a fraction of the surface's size along it, earns all.
@@ -56,44 +65,35 @@ class Borders:
 
 
 def score_borders(
-    pixels: np.ndarray,
-    normals: np.ndarray,
+    segments: np.ndarray,
     picture: Picture,
     region: SurfaceRegion,
-    paint: np.ndarray | None,
-    places: int = PLACES,
+    colors: SurfaceColors,
+    theta: np.ndarray | None = None,
 ) -> Borders:
     """Score lines as ends of the surface.
 
     Args:
-        pixels: Their end points [px], (n, 2, 2).
-        normals: Unit vectors across them [px], (n, 2).
-        picture: Colour, mask, depth and camera.
+        segments: End points (u1, v1, u2, v2) [px], (n, 4).
+        picture: The picture.
         region: The surface.
-        paint: Colour of the paint on it, RGB (3,), or None if unknown.
-        places: Places looked at along each line.
+        colors: Colours of board and paint.
+        theta: Angles of their normals [rad], (n,); None for a first look, with normals to the right and fewer places.
     """
-    assert picture.depth is not None
-    grid, ends, normals = region.grid, np.ascontiguousarray(pixels.reshape(-1, 4)), np.ascontiguousarray(normals)
+    run, normals = _along_and_across(segments)
+    if theta is not None:
+        normals *= np.sign(np.vecdot(normals, np.column_stack((np.cos(theta), np.sin(theta)))))[:, None]
+    grid, ends, paint = picture.grid, np.ascontiguousarray(segments), colors.paint if colors.paint_distinct else None
     (a, b, c), (fx, fy, cx, cy) = region.plane.inverse_depth.tolist(), picture.intrinsics
-    evidence = _border_evidence(
-        picture.rgb,
-        picture.depth,
-        picture.mask,
-        ends,
-        normals,
-        picture.scale * _DEPTH_PX,
-        picture.scale * _COLOR_PX,
-        np.array((a / fx, b / fy, c - a * cx / fx - b * cy / fy)),
-        depth_gate(region.plane),
-        np.ascontiguousarray(region.color, float),
-        np.empty(0) if paint is None else np.ascontiguousarray(paint, float),
-        places,
-    )
+    plane = np.array((a / fx, b / fy, c - a * cx / fx - b * cy / fy))
+    distances = picture.scale * _DEPTH_PX, picture.scale * _COLOR_PX
+    own, other = np.ascontiguousarray(region.color, float), np.empty(0) if paint is None else paint.astype(float)
+    images, places = (picture.rgb, picture.depth, picture.mask), _PLACES // 2 if theta is None else _PLACES
+    evidence = _border_evidence(*images, ends, normals, *distances, plane, depth_gate(region.plane), own, other, places)
     rows, columns = np.nonzero(region.colored)
     samples = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
     beyond = _samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride)
-    length = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
+    length = np.hypot(*run.T)
     grown = length / (length + _HALF_LENGTH_PX * picture.scale)
     grown = grown * np.sqrt(np.minimum(length / np.maximum(_FULL_SHARE * beyond[:, 2], 1.0), 1.0))
     scores = evidence[:, :, 0] * grown[:, None] * np.maximum(0.0, 1.0 - beyond[:, :2] / _SHARE_BEYOND)
@@ -103,12 +103,77 @@ def score_borders(
         beside = region.cells[rows, columns].mean(axis=2)
         scores = scores * np.minimum(beside / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
-    return Borders(
-        side=1 - 2 * best,
-        depth=evidence[each, best, 1],
-        color=evidence[each, best, 2],
-        score=scores[each, best],
-    )
+    return Borders(1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best])
+
+
+def end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
+    """Samples near both paint and board, bool (rows, columns)."""
+    labels = colors.label(picture.colors, *picture.grid.pixels)
+    marks = surface.cells, labels == BOARD, labels == PAINT
+    near = [cv2.dilate(cells.view(np.uint8), _NEAR_CELLS) > 0 for cells in marks]
+    return near[0] & near[1] & near[2]
+
+
+def board_beside_paint(fit: RefinedLine, colors: SurfaceColors, least: float) -> int:
+    """Side of the board, +1 or -1, if the other one shows paint along the least fraction of the line; else 0."""
+    if not colors.paint_distinct or fit.sides.size == 0:
+        return 0
+    labels = colors.label(fit.sides, *fit.pixels.T)
+    board, paint = ((labels == kind).mean(axis=1) >= least for kind in (BOARD, PAINT))
+    return 1 if board[1] and paint[0] else -1 if board[0] and paint[1] else 0
+
+
+def differing(segments: np.ndarray, picture: Picture, colors: SurfaceColors) -> np.ndarray:
+    """Fraction of each segment (n, 4) along which one side shows the board and the other the paint, (n,)."""
+    height, width = picture.mask.shape
+    u, v = places_beside(segments, ways_aside(segments, _LOOK_PX * picture.scale), _LOOKS)
+    u = np.minimum(np.maximum(np.rint(u), 0.0), width - 1.0).astype(np.intp)
+    v = np.minimum(np.maximum(np.rint(v), 0.0), height - 1.0).astype(np.intp)
+    labels = colors.label(picture.rgb[v, u], u, v)
+    one, two = labels[:, 0], labels[:, 1]
+    return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)
+
+
+def trimmed(segments: np.ndarray, picture: Picture, surface: SurfaceRegion) -> np.ndarray:
+    """The pieces beside the surface of those segments (n, 4) that reach beyond it, one each at most, (m, 4) [px].
+
+    A joint of the wall may run on where an edge of the surface stops. The search for segments joins the two, a pixel or
+    two aside; a fit to both is wrong by a part of that. Shorter pieces are left out.
+    """
+    (run, _), start, margin = _along_and_across(segments), segments[:, :2], 0.5 / _PLACES_TRIM
+    region = cv2.morphologyEx(surface.whole, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    aside = ways_aside(segments, _CELLS_BESIDE * picture.grid.stride)
+    rows, columns, inside = picture.grid.cells_at(*places_beside(segments, aside, _PLACES_TRIM, margin))
+    sides = inside & region[rows, columns]
+    marked = sides.sum(axis=2)
+    beside = np.where((marked[:, 0] >= marked[:, 1])[:, None], sides[:, 0], sides[:, 1])
+    first, count = _longest_runs(beside)
+    shortest = _SHORTEST_PX * picture.scale
+    kept = (count < _WHOLE * _PLACES_TRIM) & (count * np.hypot(*run.T) >= shortest * _PLACES_TRIM)
+    ends = [(edge / _PLACES_TRIM)[:, None] * run + start for edge in (first, first + count)]
+    return np.hstack(ends)[kept]
+
+
+def _longest_runs(marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First place and number of places of the longest run in every row of bool (n, K), (n,) each."""
+    place = np.arange(marks.shape[1])
+    length = place - np.maximum.accumulate(np.where(marks, -1, place), axis=1)  # since the last unmarked place
+    last = np.argmax(length, axis=1)
+    count = length[np.arange(len(marks)), last]
+    return last + 1 - count, count
+
+
+def _along_and_across(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ways along segments (n, 4) and unit vectors to the right of them [px], (n, 2) each."""
+    run = segments[:, 2:] - segments[:, :2]
+    return run, np.column_stack((-run[:, 1], run[:, 0])) / np.hypot(*run.T)[:, None]
+
+
+def ways_aside(segments: np.ndarray, distance: float) -> np.ndarray:
+    """Ways [px] to the left and to the right of segments (n, 4), seen from the first end to the second, (n, 2, 2)."""
+    run = segments[:, 2:] - segments[:, :2]
+    right = (distance / np.hypot(*run.T))[:, None] * np.column_stack((-run[:, 1], run[:, 0]))
+    return np.stack((-right, right), axis=1)
 
 
 def places_beside(

@@ -9,29 +9,13 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.compilation import inner, kernel
-from ibvs_qp.vision.config import REFERENCE_WIDTH, LineConfig
-from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.picture.picture import Picture, normalise
+from ibvs_qp.vision.picture.picture import Picture, half_resolution
 
-#: Pictures of less than this scale are searched at full resolution.
-_SMALL = 0.9
 #: Weakest gradient of an edge, over two pixels [grey levels], shortest segment [px at 640], and most of them.
 _GRADIENT, _SHORTEST_PX, _MOST = 6.0, 20.0, 60
-#: Half width of the strip in which a segment is fitted [px at 640].
-_REFINE_PX = 4.0
-#: A segment is fitted beyond its ends by this fraction of its length: detectors stop short.
-FIT_BEYOND = 0.15
-#: Segments fitted in one batch: those of a batch share the number of profiles.
-_BATCH = 8
-#: Polarity of a segment along the normal of its line, which points to the right of the way from end to end.
-_DARKER = -1
-
 #: Steps of the angle of a line's normal over the full circle [deg]: the normal points to the brighter side.
 _ANGLES = 360
 #: A point votes for normals within this angle of its own gradient, and supports one within the larger angle [deg].
@@ -55,120 +39,24 @@ _LEVELS = 362
 _NORMALS = np.array([(math.cos(math.radians(k)), math.sin(math.radians(k))) for k in range(_ANGLES)]).T.copy()
 
 
-def half_resolution(rgb: np.ndarray) -> tuple[np.ndarray, int]:
-    """Picture at half resolution (a small one as it is), uint8 (h, w, 3), and the factor back to its pixels."""
-    height, width = rgb.shape[:2]
-    if max(height, width) < _SMALL * REFERENCE_WIDTH:
-        return rgb, 1
-    even = rgb[: height // 2 * 2, : width // 2 * 2]  # the factor must be exact
-    return cv2.resize(even, (width // 2, height // 2), interpolation=cv2.INTER_AREA), 2
+def edge_segments(picture: Picture, region: np.ndarray, within_deg: float) -> np.ndarray:
+    """Straight edges in marked samples, bool (rows, columns), longest first.
 
-
-def edge_segments(
-    picture: Picture, grid: CoarseGrid, region: np.ndarray, tilt: float | None, within_deg: float
-) -> np.ndarray:
-    """Straight edges in marked samples, longest first.
-
-    Args:
-        picture: Colour and mask.
-        grid: Where the samples lie.
-        region: The marked ones, bool (rows, columns).
-        tilt: Angle of gravity in the picture from down [rad], None if unknown.
-        within_deg: With a tilt, edges this near to level and upright are looked for [deg].
-
-    Returns:
-        End points u1, v1, u2, v2 [px], the brighter side to the left of the way, (n, 4).
+    Where the tilt is known, edges within an angle [deg] of level and upright alone are looked for. Returns end points
+    u1, v1, u2, v2 [px], the brighter side to the left of the way, (n, 4).
     """
     small, factor = half_resolution(picture.rgb)
     rows, columns = (
-        np.minimum(factor * np.arange(size) // grid.stride, cells - 1)
+        np.minimum(factor * np.arange(size) // picture.grid.stride, cells - 1)
         for size, cells in zip(small.shape[:2], region.shape, strict=True)
     )
     normals = np.ones(_ANGLES, bool)
-    if tilt is not None:
-        normals = np.abs((np.arange(_ANGLES) - math.degrees(tilt) + 45.0) % 90.0 - 45.0) <= within_deg
+    if picture.tilt is not None:
+        normals = np.abs((np.arange(_ANGLES) - math.degrees(picture.tilt) + 45.0) % 90.0 - 45.0) <= within_deg
     shortest = _SHORTEST_PX * picture.scale / factor
-    found = find_segments(small, picture.mask, factor, np.ascontiguousarray(region), rows, columns, normals, shortest)
-    ends = found * factor + 0.5 * (factor - 1)  # pixel centres
-    return ends[np.argsort(-np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]), kind="stable")]
-
-
-def fit_segments(
-    segments: np.ndarray,
-    picture: Picture,
-    config: LineConfig,
-    colors: SurfaceColors,
-    beyond: np.ndarray | None = None,
-    contents: bool = False,
-    half_width_px: float | None = None,
-) -> list[RefinedLine | None]:
-    """Sub-pixel fits of segments.
-
-    Args:
-        segments: End points (u1, v1, u2, v2) [px], the brighter side to the left of the way, (n, 4); the brighter one
-            by the channel that changes most.
-        picture: Colour and camera.
-        config: Settings of the fit.
-        colors: Of the surface.
-        beyond: Fraction of its length by which each is fitted beyond its ends, (n,); `FIT_BEYOND` unless given.
-        contents: Whether the colours of both sides are returned.
-        half_width_px: Half width of the strips; 4 px at 640 unless given.
-
-    Returns:
-        One fit for every segment, None where nothing supports one.
-    """
-    shares = np.full(len(segments), FIT_BEYOND) if beyond is None else beyond
-    fx, fy, cx, cy = picture.intrinsics
-    x, y = normalise(segments.reshape(-1, 2, 2), picture.intrinsics).transpose(2, 1, 0)
-    across, down = y[0] - y[1], x[1] - x[0]
-    rho, theta = (across * x[0] + down * y[0]) / np.hypot(across, down), np.arctan2(down, across)
-    queries = []
-    for ends, share, *line in zip(*(each.tolist() for each in (segments, shares, rho, theta)), strict=True):
-        (u1, v1, u2, v2), upright = ends, abs(math.cos(line[1])) > abs(math.sin(line[1]))
-        low, high = sorted(((v1 - cy) / fy, (v2 - cy) / fy) if upright else ((u1 - cx) / fx, (u2 - cx) / fx))
-        span = low - share * (high - low), high + share * (high - low)
-        queries.append(LineQuery(rho=line[0], theta=line[1], polarity=_DARKER, span=span))
-    fits: list[RefinedLine | None] = []
-    for start in range(0, len(queries), _BATCH):
-        fits += refine_lines(
-            picture,
-            queries[start : start + _BATCH],
-            half_width_px=half_width_px or _REFINE_PX * picture.scale,
-            config=config,
-            colors=colors,
-            contents=contents,
-        )
-    return fits
-
-
-def find_segments(
-    small: np.ndarray,
-    mask: np.ndarray,
-    factor: int,
-    region: np.ndarray,
-    rows: np.ndarray,
-    columns: np.ndarray,
-    normals: np.ndarray,
-    shortest: float,
-) -> np.ndarray:
-    """Segments of a picture, those with most votes first.
-
-    Args:
-        small: The picture, uint8 (h, w, 3).
-        mask: Non-zero where the vehicle hides the view, at full resolution, (H, W).
-        factor: Pixels at full resolution per pixel of the picture.
-        region: Cells in which segments are searched, bool.
-        rows: Row of cells of every row of the picture, (h,).
-        columns: The same of its columns, (w,).
-        normals: Directions of the normals to search, by whole degrees, bool (360,).
-        shortest: Least length [px].
-
-    Returns:
-        u1, v1, u2, v2 [px], (n, 4). The brighter side lies to the left of the way from the first end to the second.
-    """
     middle = 0.5 * (small.shape[1] - 1), 0.5 * (small.shape[0] - 1)
     reach, least = int(math.hypot(*middle)) + 2, int(_VOTED * shortest)
-    points = _edge_points(small, mask, factor, region, rows, columns)
+    points = _edge_points(small, picture.mask, factor, np.ascontiguousarray(region), rows, columns)
     degrees = np.rint(np.degrees(np.arctan2(points[:, 3], points[:, 2]))).astype(np.int16) % _ANGLES
     points = points.take(np.argsort(degrees, kind="stable"), axis=0)
     first = np.concatenate(([0], np.cumsum(np.bincount(degrees, minlength=_ANGLES))))
@@ -177,7 +65,8 @@ def find_segments(
     degree, distance = _peaks(votes, max(least, 1))
     segments, used = np.empty((_MOST, 4)), np.zeros(len(points), np.bool_)
     kept = _segments_on(points, first, degree, distance - reach, _NORMALS, least, shortest, middle, used, segments)
-    return segments[:kept]
+    ends = segments[:kept] * factor + 0.5 * (factor - 1)  # pixel centres
+    return ends[np.argsort(-np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]), kind="stable")]
 
 
 @inner

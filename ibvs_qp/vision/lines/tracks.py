@@ -11,11 +11,10 @@ import numpy as np
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
-from ibvs_qp.vision.lines.candidates import Candidate, classify_lines, role_of
-from ibvs_qp.vision.lines.line_state import LineHint, TrackState
-from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
-from ibvs_qp.vision.picture.picture import Picture, denormalise
-from ibvs_qp.vision.surface.region import SurfaceRegion
+from ibvs_qp.vision.lines.candidates import Candidate, LineSearch, role_of
+from ibvs_qp.vision.lines.refine import LineFits, RefinedLine
+from ibvs_qp.vision.picture.picture import Picture
+from ibvs_qp.vision.surface.plane import SurfaceRegion
 
 #: Fraction of the new step in a track's running colour step.
 _STEP_BLEND = 0.2
@@ -39,52 +38,72 @@ _BORDER_PX = 7.0
 _PARALLEL = 0.9
 
 
-@dataclass
-class Track:
-    """One line followed over time; its confidence fades while it is not seen, and is whole again when it is."""
+@dataclass(frozen=True, kw_only=True)
+class LineHint:
+    """A line that the caller expects; a track starts there, or is steered there, as soon as the picture shows it."""
 
-    track_id: int
-    line: RefinedLine
-    role: str
-    kind: str
-    surface_side: int
-    score: float
-    confidence: float
-    borders_plane: bool
-    hint: str = ""
-    weight: float = 0.0
-    age: int = 1
-    hits: list[bool] = field(default_factory=lambda: [True])
-    confirmed: bool = False
-    lost_s: float = 0.0
-    fading: float = 1.0
-    rho: float = 0.0
-    theta: float = 0.0
-    covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
-    step: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    name: str  # caller's name, found again in `TrackState.hint`
+    rho: float  # expected distance, normalised
+    theta: float  # expected angle [rad]
+    kind: str = ""  # "board", "paint" or "" for any
+    surface_side: int = 0  # side of the (unpainted) surface along the normal, 0 for any
+    gate_px: float = 14.0  # half width of the search [px at 640]
+    # normalised range along x (level lines) or y (upright ones) in which it exists, or None
+    span: tuple[float, float] | None = None
+
+
+@dataclass
+class TrackState:
+    """One line followed over time, at the time of a capture; the given-out ones are copies."""
+
+    track_id: int  # identity
+    line: RefinedLine  # its last fit
+    role: str  # "horizontal" or "vertical" relative to gravity
+    kind: str  # "board", "paint" or ""
+    surface_side: int  # side of the (unpainted) surface along the normal (cos, sin)
+    score: float  # 0..1, ranks the tracks of one picture; 1 for a hint
+    certainty: float  # 0..1, fraction of such lines that are of this kind
+    borders_plane: bool  # whether the surface ends there by depth
+    hint: str = ""  # name of the hint it answers, or ""
+    weight: float = 0.0  # 0..1
+    age: int = 1  # frames since its start
+    hits: list[bool] = field(default_factory=lambda: [True])  # whether it was found, in the last pictures
+    confirmed: bool = False  # whether it was detected often enough
+    lost_s: float = 0.0  # time for which it has not been found [s]
+    fading: float = 1.0  # 0..1, by which the certainty falls in that time; whole again when it is found
+    rho: float = 0.0  # distance, normalised
+    theta: float = 0.0  # angle [rad]
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # of (rho, theta), (2, 2)
+    step: np.ndarray = field(default_factory=lambda: np.zeros(3))  # running colour step along the normal, (3,)
 
     @classmethod
-    def of(cls, identity: int, found: Candidate, hint: str = "", **more: Any) -> Track:
+    def of(cls, identity: int, found: Candidate, hint: str = "", **more: Any) -> TrackState:
         """A new track of a detected line."""
-        track = cls(
-            track_id=identity,
-            line=found.line,
-            role=found.role,
-            kind=found.kind,
-            surface_side=found.surface_side,
-            score=found.score,
-            confidence=found.confidence,
-            borders_plane=found.borders_plane,
-            hint=hint,
-            **more,
-        )
+        side, ends = found.surface_side, found.borders_plane
+        line, role, kind, score, certainty = found.line, found.role, found.kind, found.score, found.confidence
+        track = cls(identity, line, role, kind, side, score, certainty, ends, hint, **more)
         track.adopt(found.line)
         return track
 
     @property
+    def confidence(self) -> float:
+        """0..1, fraction of such lines that are of this kind; it falls while the line is not seen."""
+        return self.certainty * self.fading
+
+    @property
+    def seen(self) -> bool:
+        """Whether it was detected in this picture."""
+        return self.lost_s == 0.0
+
+    @property
+    def segment(self) -> np.ndarray:
+        """Visible end points, normalised, (2, 2)."""
+        return self.line.segment
+
+    @property
     def settled(self) -> bool:
         """Whether it is followed in this picture and a detection could add no knowledge of it."""
-        return self.confirmed and self.lost_s == 0.0 and (self.borders_plane or self.kind == "paint")
+        return self.confirmed and self.seen and (self.borders_plane or self.kind == "paint")
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -103,7 +122,7 @@ class Track:
     def blend(self, found: Candidate) -> None:
         """Blend in the appearance of its two sides in a picture."""
         self.score += _SCORE_BLEND * (found.score - self.score)
-        self.confidence += _SCORE_BLEND * (found.confidence - self.confidence)
+        self.certainty += _SCORE_BLEND * (found.confidence - self.certainty)
         self.borders_plane = self.borders_plane or found.borders_plane
 
     def adopt(self, line: RefinedLine) -> None:
@@ -113,39 +132,13 @@ class Track:
         self.line, self.rho, self.theta, self.covariance = line, line.rho, line.theta, line.covariance
         self.step = line.step if not self.step.any() else self.step + _STEP_BLEND * (line.step - self.step)
 
-    def become(self, other: Track) -> None:
+    def become(self, other: TrackState) -> None:
         """Take over the kind of another track on the same edge; the identity and the line stay."""
-        self.kind, self.borders_plane, self.confidence = other.kind, other.borders_plane, other.confidence
+        self.kind, self.borders_plane, self.certainty = other.kind, other.borders_plane, other.certainty
         self.surface_side = other.surface_side if math.cos(self.theta - other.theta) > 0.0 else -other.surface_side
 
-    def state(self) -> TrackState:
-        """Frozen copy for the outside."""
-        line = self.line
-        return TrackState(
-            track_id=self.track_id,
-            role=self.role,
-            kind=self.kind,
-            surface_side=self.surface_side,
-            rho=self.rho,
-            theta=self.theta,
-            covariance=self.covariance,
-            segment=line.segment,
-            ends=line.ends,
-            weight=self.weight,
-            confirmed=self.confirmed,
-            seen=self.lost_s == 0.0,
-            age=self.age,
-            inlier_share=line.inlier_share,
-            rms_px=line.rms_px,
-            length_px=line.length_px,
-            score=self.score,
-            confidence=self.confidence * self.fading,
-            borders_plane=self.borders_plane,
-            hint=self.hint,
-        )
 
-
-def _leaves(track: Track, picture: Picture) -> bool:
+def _leaves(track: TrackState, picture: Picture) -> bool:
     """Whether the visible part of a line lies along the picture's border, or beyond it."""
     (height, width), (fx, fy, cx, cy), least = picture.mask.shape, picture.intrinsics, _BORDER_PX * picture.scale
     cos, sin = math.cos(track.theta), math.sin(track.theta)
@@ -158,39 +151,33 @@ def _leaves(track: Track, picture: Picture) -> bool:
 class LineTracker:
     """All tracks of one camera."""
 
-    def __init__(self, config: VisionConfig) -> None:
-        self._config = config
+    def __init__(self, config: VisionConfig, colors: SurfaceColors) -> None:
+        self._config, self._colors, self._fits = config, colors, LineFits(config.line, colors)
+        self._search = LineSearch(config.detect, colors, self._fits)
         self.reset()
 
     def reset(self) -> None:
         """Forget all tracks; identities start at 1 again."""
-        self.tracks: list[Track] = []
+        self.tracks: list[TrackState] = []
         self._next_id = 1
 
     def lose(self) -> None:
         """Drop all tracks; identities go on."""
         self.tracks = []
 
-    def advance(
-        self,
-        picture: Picture,
-        motion: CameraMotion,
-        plane: np.ndarray | None,
-        interval_s: float,
-        colors: SurfaceColors,
-        tilt: float,
-        strip_px: float,
+    def refine_tracks(
+        self, picture: Picture, motion: CameraMotion, plane: np.ndarray | None, interval_s: float, strip_px: float
     ) -> None:
         """Predict every track into this picture and refine it there, within half a strip's width [px at 640]."""
         for track in self.tracks:
             track.rho, track.theta = motion.line(track.rho, track.theta, plane)
-            track.role = role_of(track.theta, tilt)
+            track.role = role_of(track.theta, picture.tilt or 0.0)
             track.age += 1
-        for track, line in zip(self.tracks, self._refined(picture, colors, strip_px), strict=True):
+        for track, line in zip(self.tracks, self._refined(picture, strip_px), strict=True):
             self._update(track, line, interval_s)
         self._drop()
 
-    def hints(self, hints: tuple[LineHint, ...], picture: Picture, colors: SurfaceColors, tilt: float) -> None:
+    def follow_hints(self, hints: tuple[LineHint, ...], picture: Picture) -> None:
         """Name the tracks that answer a hint and look where an expected line has no track yet."""
         for track in self.tracks:
             track.hint = ""
@@ -199,23 +186,16 @@ class LineTracker:
             if match is not None and self._distance_px(match, hint, picture) <= hint.gate_px:
                 match.hint = hint.name
                 continue
-            query = LineQuery(
-                rho=hint.rho, theta=hint.theta, span=hint.span, kind=hint.kind, surface_side=hint.surface_side
+            query = self._fits.query(
+                hint.rho, hint.theta, span=hint.span, kind=hint.kind, surface_side=hint.surface_side
             )
-            [line] = refine_lines(
-                picture,
-                [query],
-                half_width_px=hint.gate_px * picture.scale,
-                config=self._config.line,
-                colors=colors,
-            )
+            [line] = self._fits.fit_lines(picture, [query], hint.gate_px * picture.scale)
             least = self._config.detect.min_length * picture.mask.shape[1]
             if line is None or line.length_px < least or not self._healthy(line, picture):
                 continue
             expected = Candidate(
                 line=line,
-                pixels=denormalise(line.segment, picture.intrinsics),
-                role=role_of(line.theta, tilt),
+                role=role_of(line.theta, picture.tilt or 0.0),
                 kind=hint.kind,
                 surface_side=hint.surface_side,
                 borders_plane=False,
@@ -223,41 +203,46 @@ class LineTracker:
                 confidence=_EXPECTED_CONFIDENCE,
             )
             self._start(expected, hint.name)
-        self._merge(picture, colors)
+        self._merge(picture)
 
-    def offer(self, candidates: list[Candidate], picture: Picture) -> None:
-        """Start tracks from detected lines that nothing follows yet; refresh the others."""
-        for candidate in candidates:
-            if not candidate.kind or candidate.score < self._config.detect.min_score:
-                continue
-            fresh = Track.of(0, candidate)
-            if _leaves(fresh, picture):
-                continue
-            same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
-            if same is None:
-                self._start(candidate)
-            elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
-                same.adopt(candidate.line)
+    def find_lines(self, picture: Picture, surface: SurfaceRegion, calm: bool) -> list[Candidate]:
+        """Search for lines: border scores of the tracks are renewed, new tracks start where nothing follows a line.
 
-    def rescore(self, picture: Picture, surface: SurfaceRegion, colors: SurfaceColors, tilt: float | None) -> None:
-        """Update the border scores of the lines detected in this picture."""
-        seen = [track for track in self.tracks if track.lost_s == 0.0 and track.kind == "board"]
-        lines = [track.line for track in seen]
-        for track, found in zip(seen, classify_lines(lines, picture, surface, colors, tilt), strict=True):
+        Where all is calm, lines of settled tracks need no search.
+        """
+        seen = [track for track in self.tracks if track.seen and track.kind == "board"]
+        scored = self._search.classify_lines([track.line for track in seen], picture, surface)
+        for track, found in zip(seen, scored, strict=True):
             track.blend(found)
+        known = tuple(track.line for track in self.tracks if calm and track.settled)
+        candidates = self._search.find_candidates(picture, surface, known)
+        for candidate in candidates:
+            if candidate.kind and candidate.score >= self._config.detect.min_score:
+                self._offer(candidate, picture)
+        return candidates
+
+    def _offer(self, candidate: Candidate, picture: Picture) -> None:
+        """Start a track from a detected line that nothing follows yet; refresh the other."""
+        fresh = TrackState.of(0, candidate)
+        if _leaves(fresh, picture):
+            return
+        same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
+        if same is None:
+            self._start(candidate)
+        elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
+            same.adopt(candidate.line)
 
     def _start(self, candidate: Candidate, hint: str = "") -> None:
-        if len(self.tracks) >= self._config.track.capacity:
-            return
-        self.tracks.append(Track.of(self._next_id, candidate, hint))
-        self._next_id += 1
+        if len(self.tracks) < self._config.track.capacity:
+            self.tracks.append(TrackState.of(self._next_id, candidate, hint))
+            self._next_id += 1
 
-    def _refined(self, picture: Picture, colors: SurfaceColors, strip_px: float) -> list[RefinedLine | None]:
+    def _refined(self, picture: Picture, strip_px: float) -> list[RefinedLine | None]:
         """Healthy fits of all tracks around their predictions."""
         queries = [
-            LineQuery(
-                rho=track.rho,
-                theta=track.theta,
+            self._fits.query(
+                track.rho,
+                track.theta,
                 step=track.step,
                 span=track.span,
                 extent=track.extent,
@@ -266,19 +251,18 @@ class LineTracker:
             )
             for track in self.tracks
         ]
-        config = self._config.line
-        width = strip_px * picture.scale
-        found = refine_lines(picture, queries, half_width_px=width, config=config, colors=colors)
         return [
             line if line is not None and self._healthy(line, picture) and not _leaves(track, picture) else None
-            for track, line in zip(self.tracks, found, strict=True)
+            for track, line in zip(
+                self.tracks, self._fits.fit_lines(picture, queries, strip_px * picture.scale), strict=True
+            )
         ]
 
     def _healthy(self, line: RefinedLine, picture: Picture) -> bool:
         track = self._config.track
         return line.inlier_share >= track.inlier_share_min and line.rms_px <= track.rms_max_px * max(picture.scale, 0.5)
 
-    def _update(self, track: Track, line: RefinedLine | None, interval_s: float) -> None:
+    def _update(self, track: TrackState, line: RefinedLine | None, interval_s: float) -> None:
         config = self._config.track
         track.hits = [*track.hits, line is not None][-config.confirm_window :]
         if line is None:
@@ -305,9 +289,9 @@ class LineTracker:
             )
         ]
 
-    def _merge(self, picture: Picture, colors: SurfaceColors) -> None:
+    def _merge(self, picture: Picture) -> None:
         """Of two tracks on one edge the older stays; without distinct colours it takes the expected kind."""
-        kept: list[Track] = []
+        kept: list[TrackState] = []
         for track in self.tracks:
             twin = next((other for other in kept if self._same(other, track, picture)), None)
             if twin is None:
@@ -317,11 +301,11 @@ class LineTracker:
                 twin.adopt(track.line)
             if track.hint and not twin.hint:
                 twin.hint = track.hint
-                if not colors.paint_distinct:
+                if not self._colors.paint_distinct:
                     twin.become(track)
         self.tracks = kept
 
-    def _same(self, one: Track, two: Track, picture: Picture) -> bool:
+    def _same(self, one: TrackState, two: TrackState, picture: Picture) -> bool:
         """Whether two tracks follow one edge: near at the middle of both segments, overlapping, same colour step."""
         agreement = math.cos(one.theta - two.theta)
         if agreement * agreement < _PARALLEL or float(one.step @ two.step) * agreement <= 0.0:
@@ -335,7 +319,7 @@ class LineTracker:
         low_two, high_two = sorted(y * cos - x * sin for x, y in ends)
         return min(high_one, high_two) > max(low_one, low_two)
 
-    def _distance_px(self, track: Track, hint: LineHint, picture: Picture) -> float:
+    def _distance_px(self, track: TrackState, hint: LineHint, picture: Picture) -> float:
         """Distance of a track from a hint at the middle of its segment [px at 640]; infinite for another thing."""
         if hint.kind and track.kind != hint.kind:
             return math.inf

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.paper.config import PaperConfig
-from ibvs_qp.vision.picture.mask import Intrinsics
+from ibvs_qp.vision.picture.layout import Intrinsics
 
 #: Largest number of a 16-bit picture.
 _LARGEST = 65535.0

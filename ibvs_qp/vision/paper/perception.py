@@ -12,14 +12,13 @@ from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
 from ibvs_qp.vision.flow.sparse_flow import SparseFlow
 from ibvs_qp.vision.lines.candidates import Candidate
-from ibvs_qp.vision.lines.line_state import LineHint
-from ibvs_qp.vision.lines.tracks import Track
+from ibvs_qp.vision.lines.tracks import LineHint, TrackState
 from ibvs_qp.vision.paper.config import PaperConfig
 from ibvs_qp.vision.paper.pipeline import PaperPipeline
 from ibvs_qp.vision.paper.result import PaperDetection
-from ibvs_qp.vision.perception_result import PerceptionResult, make_result
-from ibvs_qp.vision.surface.layout import PictureLayout
-from ibvs_qp.vision.surface.seeds import UP_LEFT, facing
+from ibvs_qp.vision.perception import PerceptionResult, make_features
+from ibvs_qp.vision.picture.layout import UP_LEFT, PictureLayout
+from ibvs_qp.vision.surface.search import facing
 
 #: Identities of the two lines: the paper has no others, whichever edge is topmost or first at the moment.
 TOPMOST_TRACK, FIRST_TRACK = 1, 2
@@ -102,22 +101,21 @@ class PaperPerception:
         interval = 0.0 if self._stamp_ns is None else max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
         self._stamp_ns = frame.stamp_ns
         motion = CameraMotion.of_body(turn, velocity, interval, self._camera_position)
-        flow = self._flow.update(frame, layout.excluded, motion, found.plane)
+        flow = self._flow.measure_velocity(frame, layout.excluded, motion, found.plane, busy=False)
         times = dict(found.time_ms)
         clock.lap("flow")
-        followed = [
-            self._track(track_id, entry)
-            for track_id, entry in ((TOPMOST_TRACK, found.horizontal), (FIRST_TRACK, found.vertical))
-        ]
-        return make_result(
-            frame,
-            [track for track in followed if track is not None],
-            found.plane,
-            flow,
-            found.candidates,
-            found.refused,
-            layout.mask,
-            times | clock.times,
+        chosen = ((TOPMOST_TRACK, found.horizontal), (FIRST_TRACK, found.vertical))
+        tracks = tuple(track for track in (self._track(*each) for each in chosen) if track is not None)
+        return PerceptionResult(
+            features=make_features(frame.stamp_ns, tracks, found.plane, flow),
+            plane=found.plane,
+            tracks=tracks,
+            candidates=found.candidates,
+            refused=found.refused,
+            velocity_refused=flow if isinstance(flow, str) else None,
+            mask=layout.mask,
+            intrinsics=frame.intrinsics,
+            time_ms=times | clock.times,
         )
 
     def _find(self, frame: RgbdFrame, seed_pixel: tuple[float, float] | None) -> PaperDetection:
@@ -127,16 +125,18 @@ class PaperPerception:
         seeds = [] if self._center is None else [self._center]
         seeds += [
             (float(grid.offset + grid.stride * column), float(grid.offset + grid.stride * row))
-            for row, column in facing(grid, frame.depth, self._layout.ladder, self._vision.plane)
+            for row, column in facing(
+                grid, grid.inverse_depth(frame.depth), self._layout.ladder, self._vision.plane.seed_radius
+            )
         ]
         seeds = seeds if seed_pixel is None else [seed_pixel]
         found = self._pipeline.detect(frame, *seeds)
         self._center = None if found.box is None else found.box.center
         return found
 
-    def _track(self, track_id: int, chosen: Candidate | None) -> Track | None:
+    def _track(self, track_id: int, chosen: Candidate | None) -> TrackState | None:
         """The chosen line as a track of full weight: it counts from the first picture on."""
         self._age[track_id] = 0 if chosen is None else self._age[track_id] + 1
         if chosen is None:
             return None
-        return Track.of(track_id, chosen, weight=1.0, age=self._age[track_id], confirmed=True)
+        return TrackState.of(track_id, chosen, weight=1.0, age=self._age[track_id], confirmed=True)

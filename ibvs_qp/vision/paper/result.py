@@ -11,15 +11,15 @@ from ibvs_qp.measurement import HORIZONTAL, VERTICAL
 from ibvs_qp.vision.lines.candidates import Candidate
 from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.paper.box import SurfaceBox
-from ibvs_qp.vision.picture.mask import Intrinsics
-from ibvs_qp.vision.picture.picture import normalise, normalised_line
+from ibvs_qp.vision.picture.layout import Intrinsics
+from ibvs_qp.vision.picture.picture import normalise
 from ibvs_qp.vision.surface.plane import PlaneEstimate
 
 #: The published pipeline rates no line: every line has this confidence [-].
 CONFIDENCE = 0.5
 #: Length that earns the full score, fraction of the picture's width; as in the own detection.
 _FULL_LENGTH = 0.4
-_NO_SIDES, _NO_PIXELS, _NO_STEP = np.zeros((2, 0, 3), np.uint8), np.zeros((0, 2)), np.zeros(3)
+_NO_STEP = np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,13 +96,11 @@ def candidate(
         rms_px=sigma_px,
         length_px=length,
         step=_NO_STEP,
-        sides=_NO_SIDES,
-        pixels=_NO_PIXELS,
+        ends_px=ends,
     )
     return Candidate(
         line=line,
         role=VERTICAL if upright else HORIZONTAL,
-        pixels=ends,
         kind="",
         surface_side=side,
         borders_plane=min(abs(place - near), abs(place - far)) <= margin,
@@ -150,3 +148,11 @@ def plane_of(box: SurfaceBox, shape: tuple[int, int], columns: int) -> PlaneEsti
         residual_sigma=box.residual_sigma,
         component=component,
     )
+
+
+def normalised_line(p: float, q: float, r: float, intrinsics: Intrinsics) -> tuple[float, float]:
+    """(rho, theta) of the pixel line p u + q v + r = 0."""
+    fx, fy, cx, cy = intrinsics
+    a, b, c = p * fx, q * fy, p * cx + q * cy + r
+    length = math.hypot(a, b)
+    return -c / length, math.atan2(b, a)

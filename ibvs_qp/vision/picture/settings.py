@@ -12,6 +12,14 @@ from ibvs_qp.frames import rotation_from_vector
 
 #: Numbers of coefficients of OpenCV's lens models.
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
+#: Allowed numbers of entries.
+_COUNTS = (
+    ("distortion", DISTORTION_SIZES, "so many coefficients"),
+    ("depth_distortion", DISTORTION_SIZES, "so many coefficients"),
+    ("depth_intrinsics", (0, 4), "so many numbers (fx fy cx cy)"),
+    ("depth_rotation", (0, 3, 9), "so many numbers"),
+    ("depth_translation_m", (0, 3), "so many numbers"),
+)
 #: Shortest focal length [px].
 _SHORTEST_PX = 1.0
 #: Largest entry of R R' - I of a rotation matrix: four decimal places are enough.
@@ -55,11 +63,10 @@ class RgbdCameraSettings:
     def __post_init__(self) -> None:
         """Validate."""
         validate(self)
-        self._require_count("distortion", DISTORTION_SIZES, "so many coefficients")
-        self._require_count("depth_distortion", DISTORTION_SIZES, "so many coefficients")
-        self._require_count("depth_intrinsics", (0, 4), "so many numbers (fx fy cx cy)")
-        self._require_count("depth_rotation", (0, 3, 9), "so many numbers")
-        self._require_count("depth_translation_m", (0, 3), "so many numbers")
+        for name, counts, content in _COUNTS:
+            value, allowed = getattr(self, name), f"{content}: {', '.join(map(str, counts))}"
+            if len(value) not in counts:
+                raise out_of_range(name, value, "px" if name == "depth_intrinsics" else "", allowed)
         if self.depth_intrinsics and min(self.depth_intrinsics[:2]) <= _SHORTEST_PX:
             allowed = f"focal lengths must be above {_SHORTEST_PX:g} px"
             raise out_of_range("depth_intrinsics", self.depth_intrinsics, "px", allowed)
@@ -83,11 +90,6 @@ class RgbdCameraSettings:
         if len(self.depth_rotation) == 9:
             return np.array(self.depth_rotation).reshape(3, 3)
         return rotation_from_vector(self.depth_rotation or (0.0, 0.0, 0.0))
-
-    def _require_count(self, name: str, counts: tuple[int, ...], content: str) -> None:
-        value, allowed = getattr(self, name), f"{content}: {', '.join(map(str, counts))}"
-        if len(value) not in counts:
-            raise out_of_range(name, value, "px" if name == "depth_intrinsics" else "", allowed)
 
 
 def _is_rotation(matrix: np.ndarray) -> bool:

@@ -1,22 +1,20 @@
-"""The working surface as a plane in inverse depth, 1/Z = a x + b y + c, refitted around a plane of before."""
+"""The working surface as a plane in inverse depth, 1/Z = a x + b y + c, and the samples of a picture on it."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import BOARD, PAINT
-from ibvs_qp.vision.compilation import kernel
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT
+from ibvs_qp.vision.compilation import MAD_TO_SIGMA, kernel, median
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import SPARSER, CoarseGrid
+from ibvs_qp.vision.picture.picture import Picture
 
-#: Samples per row of a search against those of the sparser grid on which a surface is followed: the noise is correlated
-#: over 20 px of 640, so that the mean of four neighbours every 16 px is as good as one reading every 8 px.
-SPARSER = 2
 #: Gate of samples that look like paint in either round, fraction of the board's: a wall that looks like paint must not
 #: get in, so such samples count in the last round of a search only, and have to fit twice as well. For a followed
 #: surface half of the first gate (1.25 % of depth), and more than two sigmas of the last one, lie well within 4 %, a
@@ -31,29 +29,21 @@ _FLAT = 1e-6
 #: Planes are held in front of the camera: least 1/Z [1/m].
 _FARTHEST = 1e-3
 _NO_LABELS = np.empty(0, np.uint8)
+#: A reading within this fraction of depth is on the surface at least and at most; three sigmas of the fit between.
+_GATE_LOW, _GATE_HIGH, _GATE_SIGMAS = 0.010, 0.022, 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneEstimate:
-    """A fitted surface in the camera frame.
+    """A fitted surface in the camera frame."""
 
-    Attributes:
-        inverse_depth: (a, b, c) of 1/Z = a x + b y + c [1/m], (3,).
-        covariance: Of (a, b, c), correlated noise and the frame's common mode included, (3, 3).
-        normal: Outward unit normal (towards the camera) in C, (3,).
-        distance_m: Distance of the camera centre from the plane [m].
-        inlier_share: Fraction of the valid samples of the whole picture that belong to the surface.
-        residual_sigma: Standard deviation of the residuals, fraction of depth.
-        component: Samples of the surface, bool (rows, columns) of the coarse grid.
-    """
-
-    inverse_depth: np.ndarray
-    covariance: np.ndarray
-    normal: np.ndarray
-    distance_m: float
-    inlier_share: float
-    residual_sigma: float
-    component: np.ndarray
+    inverse_depth: np.ndarray  # (a, b, c) of 1/Z = a x + b y + c [1/m], (3,)
+    covariance: np.ndarray  # of (a, b, c), correlated noise and the frame's common mode included, (3, 3)
+    normal: np.ndarray  # outward unit normal (towards the camera) in C, (3,)
+    distance_m: float  # distance of the camera centre from the plane [m]
+    inlier_share: float  # fraction of the valid samples of the whole picture that belong to the surface
+    residual_sigma: float  # standard deviation of the residuals, fraction of depth
+    component: np.ndarray  # samples of the surface, bool (rows, columns) of the coarse grid
 
     @property
     def abcd(self) -> tuple[float, float, float, float]:
@@ -179,17 +169,7 @@ def depth_noise(inverse: np.ndarray) -> float:
 
 
 @kernel("Tuple((f8[::1], b1[::1]))(f8[:, ::1], f8[::1], b1[::1], u1[::1], f8[::1], b1, f8, f8, i8)")
-def choose_samples(
-    design: np.ndarray,
-    inverse: np.ndarray,
-    usable: np.ndarray,
-    labels: np.ndarray,
-    plane: np.ndarray,
-    own_depth: bool,
-    gate: float,
-    paint_gate: float,
-    least: int,
-) -> tuple[np.ndarray, np.ndarray]:
+def choose_samples(design, inverse, usable, labels, plane, own_depth, gate, paint_gate, least):
     """Usable samples (n,) within a gate of a plane, those of the surface's colours alone where at least so many are.
 
     Samples that look like paint count within a fraction of the gate. Distances are fractions of the samples' own depth
@@ -213,11 +193,10 @@ def choose_samples(
 
 
 @kernel("Tuple((b1, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], b1[::1])")
-def fit_plane(design: np.ndarray, inverse: np.ndarray, chosen: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray]:
+def fit_plane(design, inverse, chosen):
     """Least squares over chosen samples, by cofactors.
 
-    Returns:
-        Whether the samples determine a plane, (a, b, c), (3,), and the inverse of the normal matrix, (3, 3).
+    Returns whether the samples determine a plane, (a, b, c), (3,), and the inverse of the normal matrix, (3, 3).
     """
     xx = xy = x = yy = y = one = xd = yd = d = 0.0
     for i in range(len(inverse)):
@@ -243,9 +222,7 @@ def fit_plane(design: np.ndarray, inverse: np.ndarray, chosen: np.ndarray) -> tu
 
 
 @kernel("UniTuple(f8, 2)(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], i8)")
-def residual_squares(
-    design: np.ndarray, inverse: np.ndarray, component: np.ndarray, plane: np.ndarray, block: int
-) -> tuple[float, float]:
+def residual_squares(design, inverse, component, plane, block):
     """Sum of the squares of residuals [1/m^2] over the component, and of their sums over blocks of so many samples.
 
     Residuals that hold together add up in the latter.
@@ -268,3 +245,75 @@ def residual_squares(
                     together += residual[r, c]
             blocks += together * together
     return total, blocks
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceRegion:
+    """The surface in one picture."""
+
+    plane: PlaneEstimate  # its plane
+    cells: np.ndarray  # samples on it by depth, bool (rows, columns)
+    colored: np.ndarray  # those of them that have its colour, bool (rows, columns)
+    color: np.ndarray  # its colour where nothing is printed or painted on it, RGB (3,)
+    # whether colour or light separate it from a wall at its depth; `cells` are without the wall then
+    by_color: bool = False
+
+    def end_band(self, width: int) -> np.ndarray:
+        """Samples within so many cells of the surface's end, by depth or by colour, bool (rows, columns)."""
+        kernel = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
+        band = np.zeros(self.cells.shape, bool)
+        for whole in (filled(self.cells), self.whole):
+            band |= (cv2.dilate(whole, kernel) > 0) & (cv2.erode(whole, kernel, borderValue=1) == 0)
+        return band
+
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """The surface by colour without holes, uint8 (rows, columns)."""
+        return filled(self.colored)
+
+
+def depth_gate(plane: PlaneEstimate) -> float:
+    """Fraction of depth within which a reading is on the surface."""
+    return min(max(_GATE_SIGMAS * plane.residual_sigma, _GATE_LOW), _GATE_HIGH)
+
+
+def samples_on(picture: Picture, plane: PlaneEstimate, seed: tuple[int, int]) -> np.ndarray:
+    """Connected samples on a plane by depth alone, bool (rows, columns)."""
+    grid, inverse = picture.grid, picture.inverse
+    predicted = np.maximum((grid.design @ plane.inverse_depth).reshape(grid.shape), 1e-6)
+    relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
+    cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
+    return cells if cells.any() or plane.component.shape != cells.shape else plane.component
+
+
+def middle_cell(cells: np.ndarray) -> tuple[int, int]:
+    """The sample of a region that lies deepest within it."""
+    depth = cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L1, 3)
+    row, column = np.unravel_index(int(np.argmax(depth)), cells.shape)
+    return int(row), int(column)
+
+
+def filled(region: np.ndarray) -> np.ndarray:
+    """The region without the holes that prints and missing depth leave in it, uint8."""
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros_like(closed)
+    if outlines:
+        cv2.drawContours(filled, [max(outlines, key=cv2.contourArea)], -1, 1, -1)
+    return np.maximum(filled, closed)
+
+
+def connected(region: np.ndarray, grid: CoarseGrid, seed: tuple[int, int]) -> np.ndarray:
+    """The part of a region of samples that hangs together with a seed, gaps of one sample bridged."""
+    closed = cv2.morphologyEx(region.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    return connected_samples(closed, grid, seed) & region
+
+
+def on_surface(picture: Picture, plane: np.ndarray, gate: float, places: np.ndarray) -> np.ndarray:
+    """Those of flat places of samples, (n,), that lie on a surface by depth alone, of any colour.
+
+    The surface is (a, b, c) of 1/Z = a x + b y + c [1/m], the gate a fraction of depth.
+    """
+    u, v = (axis.take(places) for axis in picture.grid.pixels)
+    z, design = picture.depth[v, u], picture.grid.design.take(places, axis=0)
+    return places[np.abs(z * (design @ plane) - 1.0) < gate]  # false for NaN and for no reading

@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ibvs_qp.vision.appearance.labels import BOARD, OTHER
-from ibvs_qp.vision.compilation import kernel
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER
+from ibvs_qp.vision.compilation import MAD_TO_SIGMA, kernel, median
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.medians import MAD_TO_SIGMA, median
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import DEPTH_RATIO, Cell, CoarseGrid, Seeds
 from ibvs_qp.vision.surface.plane import PlaneEstimate, refit_plane
-from ibvs_qp.vision.surface.seeds import seed_values
 
 #: Samples by which planes are scored; more cost time and change nothing.
 _VOTERS = 400
@@ -43,15 +41,10 @@ class PlaneSearch:
         """Start again as new: same pictures, same bits."""
         self._random = np.random.default_rng(np.random.SeedSequence(self._config.random_seed))
 
-    def search(
-        self,
-        grid: CoarseGrid,
-        inverse: np.ndarray,
-        seeds: list[tuple[int, int]],
-        down: np.ndarray | None,
-        prefer: LabelsOfSeeds | None,
+    def search_plane(
+        self, grid: CoarseGrid, inverse: np.ndarray, seeds: list[Cell], down: np.ndarray | None, prefer: LabelsOfSeeds
     ) -> PlaneEstimate | str:
-        """Find the surface without a prediction.
+        """Find the surface without a prediction, or return the reason why it is missing.
 
         Args:
             grid: Where the samples lie.
@@ -59,10 +52,7 @@ class PlaneSearch:
             seeds: Cells on which the surface may lie; the nearest valid one is taken: a brush meets it first. At the
                 same depth the first one counts: a row begins at its right end, so its left is on the surface.
             down: Gravity's direction in C, unit, (3,), or None if unknown.
-            prefer: Colour labels of the samples for each seed, or None.
-
-        Returns:
-            The surface, or the reason why it is missing.
+            prefer: Colour labels of the samples for each seed.
         """
         values = seed_values(grid, inverse, seeds, self._config.seed_radius)
         order = sorted((index for index, value in enumerate(values) if value > 0), key=lambda index: -values[index])
@@ -79,15 +69,14 @@ class PlaneSearch:
         return reason
 
     def _attempts(
-        self, order: list[int], values: list[float], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds | None
+        self, order: list[int], values: list[float], seeds: list[Cell], prefer: LabelsOfSeeds
     ) -> Iterator[tuple[int, np.ndarray | None]]:
         """Seeds to try with labels of their colour or without, the likeliest first.
 
         A seed on an edge may have a colour that nearly nothing else has. Without colour its plane would tilt through
         the surface and a wall behind it, so seeds at the same depth with a colour of their own come before it.
         """
-        if prefer is None or not order:
-            yield from ((index, None) for index in order)
+        if not order:
             return
         flush = [index for index in order if values[index] > (1.0 - self._config.coarse_gate) * values[order[0]]]
         if len(order) > 1:
@@ -104,9 +93,7 @@ class PlaneSearch:
             yield index, None
 
     @staticmethod
-    def _first_of_flush(
-        order: list[int], flush: list[int], seeds: list[tuple[int, int]], prefer: LabelsOfSeeds
-    ) -> list[int]:
+    def _first_of_flush(order: list[int], flush: list[int], seeds: list[Cell], prefer: LabelsOfSeeds) -> list[int]:
         """The order of seeds, with the first listed one in front where the nearest one differs from it by colour only.
 
         Depth cannot separate a board from a wall that is flush with it.
@@ -123,7 +110,7 @@ class PlaneSearch:
         self,
         grid: CoarseGrid,
         inverse: np.ndarray,
-        seed: tuple[int, int],
+        seed: Cell,
         value: float,
         down: np.ndarray | None,
         prefer: np.ndarray | None,
@@ -155,23 +142,11 @@ class PlaneSearch:
 
 
 @kernel("Tuple((f8[:, ::1], f8[::1]))(f8[:, ::1], f8[::1], i8, f8, i8[:, ::1], i8[::1], f8, f8, f8)")
-def score_planes(
-    design: np.ndarray,
-    inverse: np.ndarray,
-    seed: int,
-    value: float,
-    pairs: np.ndarray,
-    voters: np.ndarray,
-    gate: float,
-    width: float,
-    span: float,
-) -> tuple[np.ndarray, np.ndarray]:
+def score_planes(design, inverse, seed, value, pairs, voters, gate, width, span):
     """Planes through a seed of some value and pairs of samples, and the weight of the voters that agree with each.
 
     A voter counts less the farther it is from the seed, by 1/e at a width. Planes whose arms span less area are level.
-
-    Returns:
-        (a, b, c) of the planes, (planes, 3), and the weights, (planes,).
+    Returns (a, b, c) of the planes, (planes, 3), and the weights, (planes,).
     """
     count = pairs.shape[1]
     a, b, c, scores = np.empty(count), np.empty(count), np.empty(count), np.zeros(count)
@@ -196,7 +171,7 @@ def score_planes(
 
 
 def grown_plane(
-    grid: CoarseGrid, inverse: np.ndarray, seed: tuple[int, int], start: np.ndarray, config: PlaneConfig
+    grid: CoarseGrid, inverse: np.ndarray, seed: Cell, start: np.ndarray, config: PlaneConfig
 ) -> np.ndarray:
     """Least-squares plane of the samples around a seed, the gate known from those nearer to it.
 
@@ -225,3 +200,48 @@ def grown_plane(
         sigma = MAD_TO_SIGMA * median(np.abs(residual))
         gate = min(max(config.fine_gate_sigmas * sigma, config.fine_gate_low), config.fine_gate_high)
     return plane
+
+
+def facing(grid: CoarseGrid, inverse: np.ndarray, ladder: list[Seeds], radius: int) -> list[Cell]:
+    """The seeds at which samples have the depth for which they were laid; without any, those of a contact."""
+    if not ladder:
+        return []
+    cells, gate = [(cell, seeds.depth) for seeds in ladder for cell in seeds.cells], math.sqrt(DEPTH_RATIO)
+    values = seed_values(grid, inverse, [cell for cell, _ in cells], radius)
+    fitting = [cell for (cell, z), value in zip(cells, values, strict=True) if 1.0 / gate < value * z < gate]
+    return list(dict.fromkeys(fitting)) or ladder[0].cells  # no cell twice, in order
+
+
+def seed_values(grid: CoarseGrid, inverse: np.ndarray, seeds: list[Cell], radius: int) -> list[float]:
+    """Upper median 1/Z around every seed [1/m], within a radius [cells]; 0 where too few samples have one."""
+    if not seeds:
+        return []
+    windows, least = grid.windows(seeds, radius), 2 * radius + 1
+    known = inverse.reshape(-1).take(windows)
+    known[~grid.free.reshape(-1).take(windows) | ~(known > 0.0)] = np.inf
+    known.sort(axis=1)
+    counts = np.count_nonzero(known < np.inf, axis=1).tolist()
+    return [float(row[count // 2]) if count >= least else 0.0 for row, count in zip(known, counts, strict=True)]
+
+
+def depth_problem(depth: np.ndarray, grid: CoarseGrid, seed: Cell, config: PlaneConfig) -> str | None:
+    """Why depth cannot give a surface at a seed: absent, or in wrong units; None if it is neither."""
+    samples = grid.sample(depth)
+    valid = samples[np.isfinite(samples) & (samples > 0.0)]
+    if len(valid) == 0:
+        return "the depth picture holds no valid reading"
+    low, high = config.distance_min_m, config.distance_max_m
+    typical = float(np.median(valid))
+    if not low <= typical <= high and float(((valid > low) & (valid < high)).mean()) < 0.1:
+        return (
+            f"depth of {typical:.3g} m in the middle is out of the camera's range ({low:g} to {high:g} m): "
+            "are the depth units per metre right?"
+        )
+    around = samples[grid.window(seed, config.seed_radius)]
+    around = around[np.isfinite(around) & (around > 0.0)]
+    if len(around) == 0:
+        return "no valid depth around the seed"
+    near = float(np.median(around))
+    if not low <= near <= high:
+        return f"depth of {near:.3g} m at the seed is out of range ({low:g} to {high:g} m)"
+    return None

@@ -8,6 +8,7 @@ import numpy as np
 
 from sim.evaluate.window import CONTACT_N, contact_clock, event_time, peak, tilt_deg
 from sim.flight.trace import Trace
+from sim.world.board import BoardGeometry
 
 #: The vehicle counts as detached when its tip is this far from the board at the end [m].
 DETACHED_M = 0.10
@@ -25,7 +26,7 @@ def loss_figures(trace: Trace) -> dict[str, float]:
     after = trace.t >= fault if not math.isnan(fault) else np.zeros(len(trace.t), bool)
     if not after.any():
         return {}
-    down = _rate(trace.position[after, 2], trace.t[after])
+    down = _rate(trace.position[after] @ BoardGeometry(trace.scene).down, trace.t[after])
     touching = trace.push_true[after] > CONTACT_N
     return {
         "survived_s": float(trace.t[-1] - fault),

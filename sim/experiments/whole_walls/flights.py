@@ -98,15 +98,10 @@ def paint_run(
 
 
 def wall_figures(trace: Trace) -> dict[str, float]:
-    """Figures of a paint job; whether the truth completes it; place errors of stroke 5 and of the last one [m]."""
-    assessment = Assessment(trace)
-
-    def place(number: int) -> float:
-        stroke = assessment.strokes.get(number)
-        return math.nan if stroke is None else stroke.place_error_m
-
-    return paint_figures(trace) | {
-        "done": float(assessment.completed),
-        "place_early_m": place(EARLY_STROKE),
-        "place_last_m": place(BoardGeometry(trace.scene).strokes),
-    }
+    """Figures of a paint job; whether the truth completes it; place error of the last stroke over that of stroke 5."""
+    assessment, last = Assessment(trace), BoardGeometry(trace.scene).strokes
+    figures = paint_figures(trace) | {"done": float(assessment.completed), "place_growth": math.nan}
+    if last > EARLY_STROKE and {EARLY_STROKE, last} <= assessment.strokes.keys():
+        early, late = (abs(assessment.strokes[number].place_error_m) for number in (EARLY_STROKE, last))
+        figures["place_growth"] = late / early
+    return figures

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ibvs_qp.config.vehicle import VehicleParams
+from sim.sensors.cameras.curved import CurvedCamera
 from sim.sensors.cameras.gl_context import CameraUnavailable, open_context
 from sim.sensors.cameras.plane import PlaneCamera
 from sim.sensors.cameras.protocol import Camera
@@ -47,6 +48,10 @@ def open_camera(option: str, scene: Scene, vehicle: VehicleParams, canvas: Canva
     Raises:
         CameraUnavailable: When gl is requested and does not work; see `resolve_camera`.
     """
+    if not canvas.geometry.surface.flat:
+        if option == "gl":
+            raise CameraUnavailable("--camera gl draws flat walls alone")
+        return CurvedCamera(scene, vehicle, canvas, seed)
     if option == "plane":
         return PlaneCamera(scene, vehicle, canvas, seed)
     from sim.sensors.cameras.gl import GLCamera

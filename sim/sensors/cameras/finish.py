@@ -95,7 +95,11 @@ class PictureFinish:
         self.defects.expose(rgb, stamp_ns, self._soft)
         return self.noise.add_color(self._soft) if self.noise else self._soft.copy()
 
-    def depth(self, inverse: np.ndarray, cuts: list[CutLine]) -> np.ndarray:
+    def holes(self, cuts: list[CutLine]) -> list[np.ndarray]:
+        """Flat indices of pixels without depth along each line of the outline; none without noise."""
+        return [cut.holes(self.rng, self.defects.depth.growth_px) for cut in cuts] if self.noise else []
+
+    def depth(self, inverse: np.ndarray, holes: list[np.ndarray]) -> np.ndarray:
         """Depth [m] from drawn inverse depths (H, W), which the vehicle overwrites: noise, and holes along steps."""
         depth = np.empty(inverse.shape, np.float32)
         farthest = 1.0 / FAR_M
@@ -109,8 +113,7 @@ class PictureFinish:
         defects.measure(self.noise.depth_factor() if self.noise else self._ones, inverse, depth)
         if self.noise is not None:
             flat, hidden = depth.reshape(-1), self._hides.reshape(-1)
-            for cut in cuts:
-                places = cut.holes(self.rng, defects.growth_px)
+            for places in holes:
                 flat[places[hidden.take(places) == 0]] = 0.0  # arm and brush hide the step
             flat[self.no_depth] = 0.0
         return defects.placed(depth)

@@ -87,7 +87,7 @@ class GLCamera:
         if common != 0.0:
             np.multiply(self._inverse, np.float32(1.0 / (1.0 + common)), out=self._inverse)
         color = self.finish.color(self._rgb, view, twist, stamp_ns)
-        depth = self.finish.depth(self._inverse, cuts)
+        depth = self.finish.depth(self._inverse, self.finish.holes(cuts))
         return RgbdFrame(rgb=color, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
     def close(self) -> None:

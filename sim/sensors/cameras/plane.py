@@ -70,8 +70,8 @@ class PlaneCamera:
         self._plain_wall = (*(float(entry) for entry in scene.wall.color), 255.0)
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
-        self._inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        self._rgb = np.empty((*shape, 3), np.uint8)
+        self.inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        self.drawn_rgb = np.empty((*shape, 3), np.uint8)
         self._v, self._u = np.indices(shape, np.float32)
 
     def capture(
@@ -83,19 +83,28 @@ class PlaneCamera:
     ) -> RgbdFrame:
         """Take a picture, see `sim.sensors.cameras.protocol.Camera`; the frame owns its arrays."""
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
+        cuts = self.draw(view, self.finish.common_error(view))
+        rgb = self.finish.color(self.drawn_rgb, view, twist, stamp_ns)
+        depth = self.finish.depth(self.inverse, self.finish.holes(cuts))
+        return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+
+    def draw(self, view: View, common: float) -> list[CutLine]:
+        """Draw board and wall into `drawn_rgb` and `inverse`; returns the lines of the outline in the picture.
+
+        Args:
+            view: Pose of the camera.
+            common: Common-mode error of the depth, relative.
+        """
         texture = self.canvas.flush()
         cuts, board_box = self.finish.outline(view, self._corners)
-        common = self.finish.common_error(view)
         wall = _Sheet.seen(view, self.canvas.wall, self._wall_steps, common)
         board = None if board_box is None else _Sheet.seen(view, texture, self._board_steps, common)
         if board is not None and board_box is not None:
-            self._draw(board, board_box, self._picture, self._inverse)
+            self._draw(board, board_box, self._picture, self.inverse)
         for cut in cuts:
             self._cut(wall, cut)
-        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self._rgb)
-        rgb = self.finish.color(self._rgb, view, twist, stamp_ns)
-        depth = self.finish.depth(self._inverse, cuts)
-        return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
+        cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self.drawn_rgb)
+        return cuts
 
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:
         """Colours and inverse depths of a sheet within a box."""
@@ -114,7 +123,7 @@ class PlaneCamera:
     def _cut(self, wall: _Sheet, cut: CutLine) -> None:
         """Draw the wall beyond one line of the board's outline."""
         beyond, band = cut.split()
-        self._draw(wall, beyond, self._picture, self._inverse)
+        self._draw(wall, beyond, self._picture, self.inverse)
         r0, r1, c0, c1 = band
         if r0 >= r1 or c0 >= c1:
             return
@@ -128,7 +137,7 @@ class PlaneCamera:
             corners = np.rint((cut.beyond - (c0, r0)) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillConvexPoly(mask, corners, 255.0, cv2.LINE_8, _SHIFT)
         cv2.copyTo(self._behind[r0:r1, c0:c1], mask, self._picture[r0:r1, c0:c1])
-        cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self._inverse[r0:r1, c0:c1])
+        cv2.copyTo(self._inverse_behind[r0:r1, c0:c1], mask, self.inverse[r0:r1, c0:c1])
         picture[places] = mixed
 
 

@@ -11,7 +11,7 @@ import pytest
 from ibvs_qp.frames import R_BODY_CAMERA, align_line, rotation_from_vector
 from ibvs_qp.measurement import FeatureFrame, LineFeature, RgbdFrame
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 
 INTRINSICS, SHAPE, READOUT_S = (600.0, 600.0, 319.5, 239.5), (480, 640), 0.02
 PLACE = np.array((0.2, 0.01, -0.05))

@@ -7,7 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_scenes import CEILING, FLOOR, dense, exact_thrusts, line_references, measured, pack, random_tick
+from controller_scenes import (
+    CEILING,
+    FLOOR,
+    dense,
+    exact_thrusts,
+    line_references,
+    measured,
+    moved_by_turn,
+    pack,
+    random_tick,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from law_only import evaluate_law
@@ -59,7 +69,8 @@ def closed_form(controller: HybridController, share: float, last: np.ndarray) ->
         turn = -(gains.theta_kp * line.angle_error + gains.theta_kd * line.angle_rate)
         rows.append((at_tip, wanted, weights.line * line.weight))
         rows.append((image[1] @ twist @ selection, turn, weights.line_angle * line.weight))
-    along = np.concatenate((vehicle.mass_kg * setpoints.normal, np.zeros(3)))
+    turning = share * np.array([setpoints.normal @ moved_by_turn(setpoints, axis) for axis in np.eye(3)])
+    along = vehicle.mass_kg * np.concatenate((setpoints.normal, turning))
     rows.append((along, setpoints.push_command, weights.push * share))
     standoff = setpoints.standoff_command + kept_along * (along @ before - setpoints.standoff_command)
     rows.append((along, standoff, weights.push * (1.0 - share)))
@@ -99,7 +110,8 @@ def test_with_limits_that_do_not_bind_as_well() -> None:
         controller.reset()
         rng = np.random.default_rng(seed)
         share = float(rng.uniform())
-        pack(controller, *random_tick(rng, seed % 3), share=share, last=LAST, window=(FLOOR, CEILING))
+        tick = random_tick(rng, seed % 3, lean=0.2 * (seed % 2))
+        pack(controller, *tick, share=share, last=LAST, window=(FLOOR, CEILING))
         data = controller.engine.data
         solution = controller.engine.exact.solve(data.p, data.q, data.a, data.lower, data.upper)
         assert solution is not None

@@ -11,7 +11,7 @@ from rotor_layouts import OCTOROTOR
 from allocation import control_effectiveness
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.supervision.monitors import RotorMonitor
+from ibvs_qp.supervision.rotor_monitor import RotorMonitor
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)
@@ -47,6 +47,47 @@ def test_a_rotor_that_gives_another_thrust_is_named_with_it(rotor: int, gives: f
     assert (lower[others] == VEHICLE.thrust_min[others]).all() and (upper[others] == VEHICLE.thrust_max[others]).all()
 
 
+def weak(watch: RotorMonitor, share: float, seconds: float, begin_s: float = 0.0, commanded: float = 11.3) -> str:
+    """A rotor with a fraction of its thrust, as the model with the scale of the monitor misses it."""
+    text = ""
+    for number in range(round(seconds / 0.004)):
+        missing = np.zeros(6)
+        missing[2] = commanded * (1.0 - share / watch.scale[2])
+        text = watch.update(missing, 0.1, np.full(6, commanded), begin_s + 0.004 * number)
+    return text
+
+
+@pytest.mark.parametrize("share", [0.62, 0.7, 0.75])
+def test_a_weak_rotor_is_no_fault_but_has_a_scale(share: float) -> None:
+    watch = monitor()
+    assert weak(watch, share, 1.0) == "" and watch.limits is None
+    assert watch.scale[2] == pytest.approx(share) and np.delete(watch.scale, 2) == pytest.approx(1.0)
+    assert VEHICLE.geometry.names[2] in watch.note
+    assert weak(watch, 1.0, 1.0, begin_s=5.0) == "" and watch.scale[2] == pytest.approx(1.0)  # sound again
+
+
+def test_a_rotor_that_no_scale_explains_is_limited() -> None:
+    watch, missing = monitor(), np.zeros(6)
+    missing[2] = 3.2  # whatever it is commanded
+    text = [watch.update(missing, 0.1, np.full(6, 25.0), 0.004 * number) for number in range(200)]
+    assert text[50] == "" and text[-1] == f"{VEHICLE.geometry.names[2]} gives 21.8 N"
+    assert watch.limits is not None and watch.scale == pytest.approx(1.0)
+
+
+def test_a_rotor_that_stops_after_its_scale_was_changed_is_found_at_once() -> None:
+    watch = monitor()
+    assert weak(watch, 0.7, 0.1) == "" and watch.scale[2] < 1.0
+    assert "gives" in weak(watch, 0.1, 0.08, begin_s=0.1)
+
+
+def test_another_rotor_that_stops_while_a_scale_settles_is_found_at_once() -> None:
+    watch = monitor()
+    assert weak(watch, 0.7, 0.1) == "" and watch.scale[2] < 1.0
+    missing = np.array([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
+    texts = [watch.update(missing, 0.1, HOVER, 0.1 + 0.004 * number) for number in range(20)]
+    assert VEHICLE.geometry.names[3] in texts[-1]
+
+
 def test_two_rotors_at_once_are_told_apart() -> None:
     missing = np.zeros(6)
     missing[[1, 4]] = 6.0, 5.0
@@ -76,8 +117,8 @@ def test_a_short_peak_is_no_fault() -> None:
 
 
 def test_what_the_noise_may_be_is_no_fault() -> None:
-    watch, missing = monitor(), np.array([4.0, 0, 0, 0, 0, 0])
-    found = [watch.update(missing, noise, HOVER, 0.1 * number) for number, noise in enumerate((1.0, 1.0, 0.3, 0.3))]
+    watch, missing, thrusts = monitor(), np.array([4.0, 0, 0, 0, 0, 0]), np.full(6, 7.5)
+    found = [watch.update(missing, noise, thrusts, 0.1 * number) for number, noise in enumerate((1.0, 1.0, 0.3, 0.3))]
     assert [bool(text) for text in found] == [False, False, False, True], "six standard deviations, for a while"
 
 
@@ -122,6 +163,16 @@ def test_all_rotors_at_a_limit_miss_lift_and_keep_their_lower_limits() -> None:
     assert "N of lift are missing" in text and watch.limits is not None
     lower, upper = watch.limits
     assert np.abs(upper - limit).max() < 0.1 and (lower == VEHICLE.thrust_min).all()
+
+
+def test_three_rotors_at_a_limit_have_it_in_common_with_the_others() -> None:
+    """Each limited by itself, the others were commanded 20 N of their 13 N, and the vehicle turned over."""
+    watch, wanted = monitor(), np.array([20.0, 20.0, 18.0, 11.0, 10.0, 9.0])
+    for tick in range(60):
+        watch.update(np.maximum(wanted - 13.0, 0.0), 0.1, wanted, tick * 0.004)
+    assert watch.limits is not None
+    lower, upper = watch.limits
+    assert upper == pytest.approx(13.0, abs=0.1) and (lower == VEHICLE.thrust_min).all()
 
 
 def test_a_sagging_battery_misses_lift_and_limits_no_rotor() -> None:

@@ -168,7 +168,7 @@ def test_a_rotor_that_does_not_follow_is_limited_beside_what_the_drive_reports(p
     pilot.thrust_limits = np.full(6, 1.5), np.full(6, 40.0)
     flown(pilot, vehicle, 3 * QUIET)
     lost = np.array([52.0, 52.0, 7.0, 52.0, 52.0, 52.0])
-    command = flown(pilot, vehicle, 35, follow=lambda thrusts: np.minimum(thrusts, lost))
+    command = flown(pilot, vehicle, 110, follow=lambda thrusts: np.minimum(thrusts, lost))
     assert command.safety is not SafetyState.NOMINAL
     assert any(reason.startswith("a rotor does not follow") for reason in command.safety_reasons)
     assert pilot.measurement is not None and pilot.measurement.thrust_max is not None

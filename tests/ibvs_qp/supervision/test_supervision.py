@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ SAMPLE = np.full(6, 0.5), 7
 FREE = CONTACT._replace(in_contact=False, distance=0.2, push=0.0)
 MOVING = np.array([0.1, 0.0])
 PRESS = Reference(push_force=5.0, standoff=0.02, contact=True, velocity=MOVING, travel=MOVING)
+COMMAND = Command(stamp_ns=0, thrusts=LAST, wrench=FLOOR, outcome=Outcome.SOLVED, mode="free", unallocated_wrench=FLOOR)
 STOPPED = {"image_ns": 0, "plane_ns": 0}
 
 
@@ -118,6 +120,43 @@ def test_a_rotor_that_does_not_follow_is_a_fault_with_limits() -> None:
     assert limits is not None and limits[1][2] == pytest.approx(3.3)
 
 
+def test_a_weak_rotor_gets_more_command_within_limits_and_rate() -> None:
+    weak, response = np.zeros(6), StubResponse()
+    thrusts = np.asarray(response.motor_thrusts, float)
+    weak[2] = 0.3 * thrusts[2]
+    supervision, last = Supervision(CONFIG, SafetySettings()), thrusts
+    for number in range(60):
+        scale = supervision.limits(None)
+        missing = weak if scale is None else np.zeros(6)
+        supervision.watch(quiet_tick(number), StubResponse(missing_thrust=missing))
+        command = supervision.explained(dataclasses.replace(COMMAND, thrusts=thrusts))
+        assert np.abs(command.thrusts - last).max() <= 2.0 + 1e-9  # 500 N/s
+        last = command.thrusts
+    assert supervision.state is SafetyState.NOMINAL and not supervision.faults
+    assert command.thrusts == pytest.approx(np.where(np.arange(6) == 2, thrusts / 0.7, thrusts))
+    limits = supervision.limits(None)
+    assert limits is not None and limits[1][2] == pytest.approx(0.7 * 52.56) and limits[1][0] == 52.56
+
+
+def test_a_terminated_vehicle_with_a_weak_rotor_gets_the_floor() -> None:
+    supervision = watched(60, StubResponse(missing_thrust=np.where(np.arange(6) == 2, 3.4, 0.0)))
+    assert supervision.rotor_note
+    watched(100, after=supervision, down=(0.95, 0.0, 0.31))
+    assert supervision.state is SafetyState.TERMINATED
+    for _ in range(10):
+        command = supervision.explained(dataclasses.replace(COMMAND, thrusts=FLOOR.copy()))
+    np.testing.assert_array_equal(command.thrusts, FLOOR)
+
+
+def test_thrusts_of_a_command_are_the_callers() -> None:
+    supervision = watched(30, StubResponse(missing_thrust=np.where(np.arange(6) == 2, 3.4, 0.0)))
+    first = supervision.explained(COMMAND)
+    before = first.thrusts.copy()
+    first.thrusts[:] = 0.0
+    second = supervision.explained(COMMAND)
+    assert np.abs(second.thrusts - before).max() <= 2.0 + 1e-9
+
+
 def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
     supervision, off = Supervision(CONFIG, SETTINGS), Supervision(CONFIG, SafetySettings(supervise=False))
     for each in (supervision, off):
@@ -126,9 +165,6 @@ def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
 
 
 def test_the_command_tells_state_and_reasons() -> None:
-    command = Command(
-        stamp_ns=0, thrusts=LAST, wrench=FLOOR, outcome=Outcome.SOLVED, mode="free", unallocated_wrench=FLOOR
-    )
-    assert watched(5).explained(command) is command
-    told = watched(30, down=(0.3, 0.0, 0.954)).explained(command)
+    assert watched(5).explained(COMMAND) is COMMAND
+    told = watched(30, down=(0.3, 0.0, 0.954)).explained(COMMAND)
     assert told.safety is SafetyState.RETREAT and told.safety_reasons[0].startswith("tilt: ")

@@ -15,6 +15,7 @@ from controller_scenes import (
     image_line,
     line_references,
     measured,
+    moved_by_turn,
     pack,
     random_tick,
     without_rotors,
@@ -134,14 +135,15 @@ def test_absent_lines_weigh_nothing_and_their_place_stays(controller: HybridCont
 def test_every_other_task_row_by_hand(plain: HybridController, share: float) -> None:
     rng, controller = np.random.default_rng(7), plain
     weights, gains = controller.config.weights, controller.config.gains
-    for _ in range(20):
+    for lean in np.linspace(-0.25, 0.25, 20):
         controller.reset()
         last = rng.uniform(8.0, 14.0, 6)
-        pack(controller, *random_tick(rng, 2), share=share, last=last)
+        pack(controller, *random_tick(rng, 2, lean=lean), share=share, last=last)
         thrusts, setpoints = rng.uniform(2.0, 30.0, 6), controller.setpoints
         right, down = weights.velocity * setpoints.free[0], weights.velocity * setpoints.free[1]
         motion = accelerations(controller, thrusts)
-        force = motion[:3] * controller.config.vehicle.mass_kg
+        vehicle = controller.config.vehicle
+        force = (motion[:3] + share * moved_by_turn(setpoints, motion[3:])) * vehicle.mass_kg  # in contact the tip's
         found = rows(controller, thrusts)
         expected = {
             "push": (setpoints.normal @ force, setpoints.push_command, weights.push * share),

@@ -30,6 +30,15 @@ def checked(features: FeatureFrame) -> tuple[FeatureFrame, list[str]]:
     return check_features(features, MOST, rejected), rejected
 
 
+def test_curvature_passes_within_its_bound() -> None:
+    curved = np.array([0.6, 0.1, -0.3])
+    found, rejected = checked(replace(GOOD, curvature=curved))
+    assert rejected == [] and np.array_equal(found.curvature, curved) and found.curvature is not curved
+    for bad in (np.array([math.nan, 0.0, 0.0]), np.array([3.0, 0.0, 0.0]), np.zeros(2)):
+        found, rejected = checked(replace(GOOD, curvature=bad))
+        assert found.curvature is None and "curvature" in rejected[0] and found.plane == GOOD.plane
+
+
 def test_sound_features_pass_and_are_copies() -> None:
     found, rejected = checked(GOOD)
     assert rejected == [] and found.lines == GOOD.lines and found.plane == GOOD.plane

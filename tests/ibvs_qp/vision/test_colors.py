@@ -7,7 +7,8 @@ import pytest
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SurfaceColors
 from ibvs_qp.vision.appearance.light import light_of
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.config import PlaneConfig
+from ibvs_qp.vision.picture.layout import CoarseGrid
 
 GATE, WHITE, RED = 42.0, (200, 204, 196), (180, 40, 50)
 SHAPE = (120, 160)
@@ -15,7 +16,7 @@ SHAPE = (120, 160)
 
 @pytest.fixture
 def grid() -> CoarseGrid:
-    return CoarseGrid(SHAPE, (150.0, 150.0, 79.5, 59.5), np.zeros(SHAPE, np.uint8), 40)
+    return CoarseGrid((150.0, 150.0, 79.5, 59.5), np.zeros(SHAPE, np.uint8), PlaneConfig(grid_columns=40))
 
 
 def noisy(color: tuple[float, ...], shape: tuple[int, ...], seed: int = 1) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.picture.exposure import ExposureSteps, brightness_ratio
+from ibvs_qp.vision.picture.picture import ExposureSteps, brightness_ratio
 
 FRAME_NS = 33_000_000
 

@@ -13,10 +13,15 @@ from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.config import FlowConfig, MaskConfig, VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
-from ibvs_qp.vision.flow.sparse_flow import SparseFlow, expected_points, information_root, inverse_depths
-from ibvs_qp.vision.flow.velocity import FlowVelocity, solve_velocity
-from ibvs_qp.vision.picture.mask import vehicle_mask
-from ibvs_qp.vision.surface.layout import PictureLayout
+from ibvs_qp.vision.flow.sparse_flow import (
+    FlowVelocity,
+    SparseFlow,
+    expected_points,
+    information_root,
+    inverse_depths,
+    solve_velocity,
+)
+from ibvs_qp.vision.picture.layout import PictureLayout, vehicle_mask
 
 FOCAL, INTERVAL, CONFIG = 150.0, 0.033, FlowConfig()
 INTRINSICS = (FOCAL, FOCAL, 79.5, 59.5)
@@ -106,7 +111,7 @@ def test_weak_texture_is_followed_beside_a_strong_corner(texture: float, screw: 
         rgb = np.repeat(np.clip(np.rint(grey), 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
         depth, stamp_ns = np.full((480, 640), depth_m, np.float32), round((1 + number) * INTERVAL * 1e9)
         frame = RgbdFrame(rgb=rgb, depth=depth, intrinsics=(focal, focal, 319.5, 239.5), stamp_ns=stamp_ns)
-        found.append(flow.update(frame, np.zeros((240, 320), np.uint8), STILL, None))
+        found.append(flow.measure_velocity(frame, np.zeros((240, 320), np.uint8), STILL, None, busy=False))
     velocities = [R_BODY_CAMERA.T @ each.velocity for each in found[1:] if isinstance(each, FlowVelocity)]
     if texture == 0.0:
         deviations = [np.sqrt(each.covariance[1, 1]) for each in found if isinstance(each, FlowVelocity)]
@@ -133,7 +138,7 @@ def test_the_edge_of_the_arm_is_not_taken_for_a_wall_that_stands_still() -> None
         rgb = np.repeat(grey.clip(0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
         frame = RgbdFrame(rgb=rgb, depth=depth, intrinsics=intrinsics, stamp_ns=picture * 33_000_000)
         excluded = PictureLayout(frame, config, vehicle).excluded
-        found = flow.update(frame, excluded, STILL, None)
+        found = flow.measure_velocity(frame, excluded, STILL, None, busy=False)
         if picture:
             assert isinstance(found, FlowVelocity)
             velocities.append((R_BODY_CAMERA.T @ found.velocity)[0])

@@ -13,8 +13,9 @@ from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision import Perception, VisionConfig
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines.refine import LineQuery, refine_lines
-from ibvs_qp.vision.lines.tracks import LineTracker, Track
+from ibvs_qp.vision.lines.refine import LineFits
+from ibvs_qp.vision.lines.tracks import LineTracker, TrackState
+from ibvs_qp.vision.picture.layout import PictureLayout
 from ibvs_qp.vision.picture.picture import Picture
 
 FOCAL, SIZE = 600.0, (480, 640)
@@ -32,14 +33,18 @@ def picture() -> Picture:
     rgb[STROKE : BOTTOM - 20, LEFT + 20 : RIGHT - 20] = PAINT
     noise = np.random.default_rng(3).normal(0.0, 2.0, rgb.shape)
     rgb = np.clip(cv2.GaussianBlur(rgb, (0, 0), 0.7) + noise, 0, 255).astype(np.uint8)
-    return Picture.of(rgb, np.zeros(SIZE, np.uint8), INTRINSICS)
+    frame = RgbdFrame(rgb=rgb, depth=np.zeros(SIZE, np.float32), intrinsics=INTRINSICS, stamp_ns=0)
+    return Picture(frame, PictureLayout(frame, VisionConfig(), None))
 
 
-def query(pixel: float, upright: bool, kind: str, side: int, guess_px: float = 2.0) -> LineQuery:
+FITS = LineFits(LineConfig(), SurfaceColors(BOARD, PAINT, LineConfig().color_gate))
+
+
+def query(pixel: float, upright: bool, kind: str, side: int, guess_px: float = 2.0) -> tuple[object, ...]:
     """A line expected a little beside a border between two pixels."""
     center = INTRINSICS[2] if upright else INTRINSICS[3]
     theta = 0.002 if upright else 0.5 * np.pi + 0.002
-    return LineQuery(rho=(pixel - 0.5 + guess_px - center) / FOCAL, theta=theta, kind=kind, surface_side=side)
+    return FITS.query((pixel - 0.5 + guess_px - center) / FOCAL, theta, kind=kind, surface_side=side)
 
 
 QUERIES = [
@@ -53,9 +58,8 @@ QUERIES = [
 PLACES = [TOP, BOTTOM, LEFT, RIGHT, STROKE]
 
 
-def refined(queries: list[LineQuery]):
-    colors = SurfaceColors(BOARD, PAINT, LineConfig().color_gate)
-    return refine_lines(picture(), queries, half_width_px=14.0, config=LineConfig(), colors=colors, contents=True)
+def refined(queries: list[tuple[object, ...]]):
+    return FITS.fit_lines(picture(), queries, 14.0, contents=True)
 
 
 def test_batch_equals_lines_alone() -> None:
@@ -74,9 +78,7 @@ def test_batch_equals_lines_alone() -> None:
 
 def test_no_queries_and_lines_outside_the_picture() -> None:
     assert refined([]) == []
-    assert (
-        refined([LineQuery(rho=2.0, theta=0.5 * np.pi), LineQuery(rho=0.0, theta=1.57, span=(3.0, 4.0))]) == [None] * 2
-    )
+    assert refined([FITS.query(2.0, 0.5 * np.pi), FITS.query(0.0, 1.57, span=(3.0, 4.0))]) == [None] * 2
 
 
 def test_an_edge_that_the_brush_half_hides_is_as_certain_as_what_is_seen_of_it() -> None:
@@ -95,7 +97,7 @@ def test_an_edge_that_the_brush_half_hides_is_as_certain_as_what_is_seen_of_it()
     seen = [perception.process(corner(number), attitude=level, rotation=np.zeros(3)) for number in range(12)][-1]
     upright = [track for track in seen.tracks if track.role == "vertical"]
     assert len(upright) == 1
-    assert upright[0].length_px > 100.0
+    assert upright[0].line.length_px > 100.0
     assert upright[0].confidence > 0.5
     assert len(seen.features.lines) == 2
 
@@ -129,7 +131,16 @@ def test_all_four_edges_are_found_in_pictures_of_any_size(size: tuple[int, int])
 def test_a_line_fitted_with_the_other_normal_leaves_a_track_as_it_is() -> None:
     [line] = refined([query(TOP, False, "board", 1)])
     assert line is not None
-    track = Track(1, line, "horizontal", "board", 1, 0.9, 0.9, True)
+    track = TrackState(
+        track_id=1,
+        line=line,
+        role="horizontal",
+        kind="board",
+        surface_side=1,
+        score=0.9,
+        certainty=0.9,
+        borders_plane=True,
+    )
     track.adopt(line)
     before = track.rho, track.theta, track.step.tolist(), track.covariance.tolist()
     turned = dataclasses.replace(
@@ -149,12 +160,12 @@ def test_light_is_forgotten_with_the_size_of_the_picture_and_identities_go_on(mo
     perception, stamp = Perception(VisionConfig(board_color=BOARD), None), 0
     seen, widths = [], []
 
-    def hints(self: LineTracker, hints: object, picture: Picture, *more: object) -> None:
+    def follow_hints(self: LineTracker, hints: object, picture: Picture, *more: object) -> None:
         """The first search after a change: what the light's cells are then."""
         light = perception._colors.light
         widths.append((picture.mask.shape[1], None if light is None else 16 * light.levels.shape[1]))
 
-    monkeypatch.setattr(LineTracker, "hints", hints)
+    monkeypatch.setattr(LineTracker, "follow_hints", follow_hints)
     for half in (False,) * 3 + (True,) * 7 + (False,) * 7:
         stamp += 33_000_000
         frame = shaded(stamp)

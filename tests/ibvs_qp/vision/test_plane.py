@@ -10,7 +10,7 @@ import pytest
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.surface.plane import PlaneEstimate, depth_noise, refit_plane
 from ibvs_qp.vision.surface.search import PlaneSearch
 
@@ -22,7 +22,12 @@ SEED = (17, 28)  # left of the brush at the tip's height
 
 
 def grid() -> CoarseGrid:
-    return CoarseGrid(SHAPE, INTRINSICS, np.zeros(SHAPE, np.uint8), 80)
+    return CoarseGrid(INTRINSICS, np.zeros(SHAPE, np.uint8), CONFIG)
+
+
+def plain(seed: int) -> np.ndarray:
+    """No colour anywhere."""
+    return np.full(grid().shape, OTHER, np.uint8)
 
 
 def inverse_plane(distance: float, yaw_deg: float = 0.0, lean_deg: float = 0.0) -> np.ndarray:
@@ -49,7 +54,7 @@ def render(
 def search(depth: np.ndarray, config: PlaneConfig | None = None, down: np.ndarray | None = DOWN) -> PlaneEstimate | str:
     config = config or CONFIG
     places = grid()
-    return PlaneSearch(config).search(places, places.inverse_depth(depth, CONFIG), [SEED], down, None)
+    return PlaneSearch(config).search_plane(places, places.inverse_depth(depth), [SEED], down, plain)
 
 
 @pytest.mark.parametrize("gap", [0.05, 0.03])
@@ -92,7 +97,7 @@ def test_tracking_agrees_with_search_and_follows_motion() -> None:
     assert isinstance(plane, PlaneEstimate)
     for k in range(20):
         truth = inverse_plane(0.6 - 0.005 * k, 0.2 * k)
-        inverse = places.inverse_depth(render(truth, 0.05, rng), CONFIG)
+        inverse = places.inverse_depth(render(truth, 0.05, rng))
         found = refit_plane(places, inverse, None, plane.inverse_depth, DOWN, CONFIG)
         assert isinstance(found, PlaneEstimate), found
         assert abs(found.distance_m - (0.6 - 0.005 * k)) < 0.004
@@ -124,14 +129,14 @@ def test_thin_evidence_is_refused_with_a_reason(change, reason: str) -> None:
 @pytest.mark.parametrize("noise", [0.0, 0.004, 0.0085, 0.025])
 def test_noise_of_single_samples_is_measured_whatever_the_slope(noise: float, yaw: float) -> None:
     depth = render(inverse_plane(0.5, yaw), 0.05, np.random.default_rng(0), noise=noise)
-    assert depth_noise(grid().inverse_depth(depth, CONFIG)) == pytest.approx(noise, rel=0.15, abs=1e-4)
+    assert depth_noise(grid().inverse_depth(depth)) == pytest.approx(noise, rel=0.15, abs=1e-4)
 
 
 def test_noise_that_tears_the_surface_apart_is_named() -> None:
     truth, rng = inverse_plane(0.5), np.random.default_rng(0)
     places, reasons = grid(), []
     for _ in range(20):
-        inverse = places.inverse_depth(render(truth, 0.05, rng, noise=0.03), CONFIG)
+        inverse = places.inverse_depth(render(truth, 0.05, rng, noise=0.03))
         found = refit_plane(places, inverse, None, 1.02 * truth, DOWN, CONFIG)
         reasons.append(found if isinstance(found, str) else "")
     assert any(reason.startswith("depth scatters by 3.") for reason in reasons), reasons
@@ -141,16 +146,16 @@ def test_floor_is_no_working_surface() -> None:
     _, v = np.meshgrid(np.arange(SHAPE[1]), np.arange(SHAPE[0]))
     floor = np.where(v > 120, 0.6 / np.maximum((v - 100.0) / FOCAL, 1e-3), 0.0).astype(np.float32)
     places = grid()
-    found = PlaneSearch(CONFIG).search(places, places.inverse_depth(floor, CONFIG), [(40, 40)], DOWN, None)
+    found = PlaneSearch(CONFIG).search_plane(places, places.inverse_depth(floor), [(40, 40)], DOWN, plain)
     assert isinstance(found, str)
 
 
 def test_reset_repeats_the_same_bits() -> None:
     places, finder = grid(), PlaneSearch(CONFIG)
-    inverse = places.inverse_depth(render(inverse_plane(0.5), 0.05, np.random.default_rng(2)), CONFIG)
-    first = finder.search(places, inverse, [SEED], DOWN, None)
+    inverse = places.inverse_depth(render(inverse_plane(0.5), 0.05, np.random.default_rng(2)))
+    first = finder.search_plane(places, inverse, [SEED], DOWN, plain)
     finder.reset()
-    second = finder.search(places, inverse, [SEED], DOWN, None)
+    second = finder.search_plane(places, inverse, [SEED], DOWN, plain)
     assert isinstance(first, PlaneEstimate) and isinstance(second, PlaneEstimate)
     assert np.array_equal(first.inverse_depth, second.inverse_depth)
 
@@ -164,8 +169,8 @@ def test_a_board_flush_with_its_wall_is_the_surface_left_of_the_brush() -> None:
     likeness = [board_is_left, np.where(board_is_left == BOARD, OTHER, BOARD).astype(np.uint8)]
     for seed in range(10):
         noise = 1.0 + 0.005 * np.random.default_rng(seed).standard_normal(SHAPE)
-        inverse = places.inverse_depth((depth * noise).astype(np.float32), CONFIG)
-        found = PlaneSearch(CONFIG).search(places, inverse, [left, right], DOWN, likeness.__getitem__)
+        inverse = places.inverse_depth((depth * noise).astype(np.float32))
+        found = PlaneSearch(CONFIG).search_plane(places, inverse, [left, right], DOWN, likeness.__getitem__)
         assert isinstance(found, PlaneEstimate), found
         assert found.component[:, :40].mean() > 0.9 and not found.component[:, 48:].any()
 
@@ -177,7 +182,7 @@ def test_a_wall_behind_the_board_is_not_the_surface_because_it_is_left_of_the_br
     labels = np.zeros(places.shape, np.uint8)
     labels[:, :43] = BOARD
     likeness = [labels, np.where(labels == BOARD, OTHER, BOARD).astype(np.uint8)]
-    inverse = places.inverse_depth(depth, CONFIG)
-    found = PlaneSearch(CONFIG).search(places, inverse, [SEED, (17, 52)], DOWN, likeness.__getitem__)
+    inverse = places.inverse_depth(depth)
+    found = PlaneSearch(CONFIG).search_plane(places, inverse, [SEED, (17, 52)], DOWN, likeness.__getitem__)
     assert isinstance(found, PlaneEstimate), found
     assert found.distance_m == pytest.approx(0.5, abs=0.004)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.appearance.labels import BOARD, PAINT
+from ibvs_qp.vision.appearance.colors import BOARD, PAINT
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
+from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.surface.plane import choose_samples, connected_samples, fit_plane, residual_squares
 from ibvs_qp.vision.surface.search import score_planes
 
@@ -77,21 +77,21 @@ def test_planes_are_scored_by_what_agrees(rng: np.random.Generator) -> None:
 def test_depth_is_read_where_it_is_in_range(rng: np.random.Generator) -> None:
     depth = rng.uniform(0.5, 2.0, (30, 40)).astype(np.float32)
     depth[::5], depth[::7, ::2], depth[::4, ::3] = 0.0, np.nan, np.inf
-    grid = CoarseGrid((30, 40), (40.0, 40.0, 19.5, 14.5), np.zeros((30, 40), np.uint8), 20)
-    config = PlaneConfig(distance_min_m=0.6, distance_max_m=1.9)
+    config = PlaneConfig(grid_columns=20, distance_min_m=0.6, distance_max_m=1.9)
+    grid = CoarseGrid((40.0, 40.0, 19.5, 14.5), np.zeros((30, 40), np.uint8), config)
     v, u = np.mgrid[1:30:2, 1:40:2]
     z = depth[v, u].astype(float)
     wanted = np.divide(1.0, z, out=np.zeros_like(z), where=(z > 0.6) & (z < 1.9))
-    np.testing.assert_array_equal(grid.inverse_depth(depth, config), wanted)
+    np.testing.assert_array_equal(grid.inverse_depth(depth), wanted)
     z = np.mean([depth[r, c].astype(float) for r in (v - 1, v) for c in (u - 1, u)], axis=0)
     wanted = np.divide(1.0, z, out=np.zeros_like(z), where=(z > 0.6) & (z < 1.9))
-    np.testing.assert_allclose(grid.mean_inverse_depth(depth, config), wanted, rtol=1e-6)
+    np.testing.assert_allclose(grid.mean_inverse_depth(depth), wanted, rtol=1e-6)
 
 
 def test_hidden_samples_connect_the_surface() -> None:
     mask = np.zeros((120, 200), np.uint8)
     mask[:, 96:104] = 255
-    grid = CoarseGrid((120, 200), (150.0, 150.0, 99.5, 59.5), mask, 50)
+    grid = CoarseGrid((150.0, 150.0, 99.5, 59.5), mask, PlaneConfig(grid_columns=50))
     inlier = grid.free.copy()
     inlier[:, 40] = inlier[10] = False
     upper = inlier.copy()

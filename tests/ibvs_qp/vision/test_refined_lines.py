@@ -9,14 +9,16 @@ import cv2
 import numpy as np
 import pytest
 
+from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.appearance.colors import SurfaceColors
-from ibvs_qp.vision.config import LineConfig
-from ibvs_qp.vision.lines.refine import LineQuery, RefinedLine, refine_lines
+from ibvs_qp.vision.config import LineConfig, VisionConfig
+from ibvs_qp.vision.lines.refine import LineFits, RefinedLine
+from ibvs_qp.vision.picture.layout import PictureLayout
 from ibvs_qp.vision.picture.picture import Picture
 
 SIZE, INTRINSICS = (480, 640), (600.0, 480.0, 319.5, 239.5)
 DARK, BRIGHT, EDGE = 60, 200, 140
-NO_COLORS = SurfaceColors(None, None, LineConfig().color_gate)
+FITS = LineFits(LineConfig(), SurfaceColors(None, None, LineConfig().color_gate))
 
 
 def picture(*, upright: bool, first: int = 0, last: int = 10_000) -> Picture:
@@ -26,7 +28,8 @@ def picture(*, upright: bool, first: int = 0, last: int = 10_000) -> Picture:
     bright = (across + 0.01 * along > EDGE) & (along >= first) & (along < last)
     rgb = np.where(bright, BRIGHT, DARK)[..., None] + np.random.default_rng(4).normal(0.0, 1.0, (*SIZE, 3))
     rgb = cv2.GaussianBlur(np.clip(rgb, 0, 255).astype(np.uint8), (0, 0), 0.7)
-    return Picture.of(rgb, np.zeros(SIZE, np.uint8), INTRINSICS)
+    frame = RgbdFrame(rgb=rgb, depth=np.zeros(SIZE, np.float32), intrinsics=INTRINSICS, stamp_ns=0)
+    return Picture(frame, PictureLayout(frame, VisionConfig(), None))
 
 
 def fitted(
@@ -36,8 +39,7 @@ def fitted(
     rho, theta = (EDGE - center) / focal, 0.0 if upright else 0.5 * math.pi
     if turned:
         rho, theta = -rho, theta - math.pi
-    query = LineQuery(rho=rho, theta=theta, span=span)
-    [line] = refine_lines(seen, [query], half_width_px=14.0, config=LineConfig(), colors=NO_COLORS, contents=True)
+    [line] = FITS.fit_lines(seen, [FITS.query(rho, theta, span=span)], 14.0, contents=True)
     assert line is not None
     return line
 
@@ -89,11 +91,9 @@ def test_ends_are_named_by_their_reason(upright: bool) -> None:
 
 def test_predictions_that_are_no_numbers_find_nothing_and_leave_the_others_alone() -> None:
     bad = (math.nan, math.inf, -math.inf, 1e300)
-    queries = [LineQuery(rho=rho, theta=theta) for rho, theta in itertools.product((0.1, *bad), (0.0, *bad))][1:]
-    queries += [LineQuery(rho=0.0, theta=0.0, span=span) for span in itertools.product((0.0, *bad), (0.0, *bad))]
+    queries = [FITS.query(rho, theta) for rho, theta in itertools.product((0.1, *bad), (0.0, *bad))][1:]
+    queries += [FITS.query(0.0, 0.0, span=span) for span in itertools.product((0.0, *bad), (0.0, *bad))]
     focal, center = INTRINSICS[1], INTRINSICS[3]
-    queries.append(LineQuery(rho=(EDGE - center) / focal, theta=0.5 * math.pi))
-    found = refine_lines(
-        picture(upright=False), queries, half_width_px=14.0, config=LineConfig(), colors=NO_COLORS, contents=True
-    )
+    queries.append(FITS.query((EDGE - center) / focal, 0.5 * math.pi))
+    found = FITS.fit_lines(picture(upright=False), queries, 14.0, contents=True)
     assert [line is not None for line in found] == [False] * (len(queries) - 1) + [True]

@@ -7,14 +7,14 @@ import pytest
 
 from ibvs_qp.config import VehicleParams
 from ibvs_qp.vision.config import PlaneConfig
-from ibvs_qp.vision.picture.grid import CoarseGrid
-from ibvs_qp.vision.surface.seeds import facing, seeds_ahead
+from ibvs_qp.vision.picture.layout import CoarseGrid, seeds_ahead
+from ibvs_qp.vision.surface.search import facing
 
 SHAPE, INTRINSICS, BRUSH_M = (480, 640), (625.2, 625.2, 319.5, 239.5), 0.08
 
 
 def grid_of(mask: np.ndarray | None = None) -> CoarseGrid:
-    return CoarseGrid(SHAPE, INTRINSICS, np.zeros(SHAPE, np.uint8) if mask is None else mask, 80)
+    return CoarseGrid(INTRINSICS, np.zeros(SHAPE, np.uint8) if mask is None else mask, PlaneConfig())
 
 
 def test_seeds_of_a_contact_lie_beside_the_brush() -> None:
@@ -36,7 +36,7 @@ def test_with_everything_beside_the_brush_hidden_the_surface_is_looked_for_below
 def test_seeds_follow_the_place_where_the_tip_will_meet_the_surface(depth: float) -> None:
     grid = grid_of()
     ladder = seeds_ahead(grid, VehicleParams(), BRUSH_M)
-    cells = facing(grid, np.full(SHAPE, depth, np.float32), ladder, PlaneConfig())
+    cells = facing(grid, grid.inverse_depth(np.full(SHAPE, depth, np.float32)), ladder, PlaneConfig().seed_radius)
     x, y = -1.7 * 0.5 * BRUSH_M / depth, -0.08 / depth  # the tip is 0.08 m above the camera
     row, column, _ = grid.cells_at(INTRINSICS[0] * x + INTRINSICS[2], INTRINSICS[1] * y + INTRINSICS[3])
     assert cells and abs(cells[0][0] - row) <= 1 and abs(cells[0][1] - column) <= 1
@@ -52,4 +52,4 @@ def test_the_first_seed_lies_inwards_of_the_corner_at_which_the_job_begins() -> 
 def test_without_depth_at_any_distance_those_of_a_contact_remain() -> None:
     grid = grid_of()
     ladder = seeds_ahead(grid, VehicleParams(), BRUSH_M)
-    assert facing(grid, np.zeros(SHAPE, np.float32), ladder, PlaneConfig()) == ladder[0].cells
+    assert facing(grid, np.zeros(grid.shape), ladder, PlaneConfig().seed_radius) == ladder[0].cells

@@ -8,9 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from ibvs_qp.vision.lines.borders import places_beside
-from ibvs_qp.vision.lines.candidates import _aside
-from ibvs_qp.vision.lines.segments import find_segments
+from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.vision.config import VisionConfig
+from ibvs_qp.vision.lines.borders import places_beside, ways_aside
+from ibvs_qp.vision.lines.segments import edge_segments
+from ibvs_qp.vision.picture.layout import PictureLayout
+from ibvs_qp.vision.picture.picture import Picture
 from sim.detection import segments as every_segment
 
 
@@ -23,9 +26,10 @@ def two_tone(angle: float) -> np.ndarray:
 
 
 def ours(rgb: np.ndarray) -> np.ndarray:
-    mask, whole = np.zeros(rgb.shape[:2], np.uint8), np.ones((1, 1), bool)
-    rows, columns = (np.zeros(size, int) for size in mask.shape)
-    return find_segments(rgb, mask, 1, whole, rows, columns, np.ones(360, bool), 20.0)
+    shape = rgb.shape[:2]
+    frame = RgbdFrame(rgb=rgb, depth=np.zeros(shape, np.float32), intrinsics=(300.0, 300.0, 160.0, 120.0), stamp_ns=0)
+    picture = Picture(frame, PictureLayout(frame, VisionConfig(), None))
+    return edge_segments(picture, np.ones(picture.grid.shape, bool), 0.0)
 
 
 def general(rgb: np.ndarray) -> np.ndarray:
@@ -44,7 +48,7 @@ def test_the_brighter_side_lies_to_the_left_of_a_segment(finder, angle: float) -
 
 def test_side_0_of_a_segment_is_its_left() -> None:
     segments = np.array([[10.0, 19.5, 50.0, 19.5], [50.0, 19.5, 10.0, 19.5]])
-    u, v = places_beside(segments, _aside(segments, 4.0), 9, margin=0.05)
+    u, v = places_beside(segments, ways_aside(segments, 4.0), 9, margin=0.05)
     np.testing.assert_allclose(u[0], np.tile(np.linspace(12.0, 48.0, 9), (2, 1)))
     np.testing.assert_allclose(u[1], u[0, :, ::-1])
     assert v[:, :, 0].tolist() == [[15.5, 23.5], [23.5, 15.5]] and (v == v[:, :, :1]).all()  # v points down

@@ -22,7 +22,7 @@ import ibvs_qp.interfaces.ros.write_bag as write_bag_module
 from ibvs_qp import RgbdFrame, SensorFrame
 from ibvs_qp.interfaces.ros.messages import typestore
 from ibvs_qp.interfaces.ros.write_bag import write_bag
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from sim.commands.cli import main
 from tests.support.truth import FAMILIES, render_frame, sample_scene
 from tests.support.truth.accuracy import line_errors

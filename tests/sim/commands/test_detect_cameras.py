@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from sim.commands.cli import main
 from tests.support.truth import FAMILIES, TruthFrame, render_frame, sample_scene
 from tests.support.truth.accuracy import line_errors

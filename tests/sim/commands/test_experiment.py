@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from itertools import accumulate
 
+import numpy as np
 import polars as pl
 import pytest
 from press_trace import press_trace
 from synthetic_trace import Errors, synthetic_trace
 
+import ibvs_qp
 import sim.sweep.flying
+from ibvs_qp.config.contact_margin import contact_mode_damping
 from sim.commands.cli import main
 from sim.experiments.design import Choice, designs
-from sim.experiments.figures.force_map import predicted_damping
+from sim.experiments.variants import VARIANTS, with_force_gain
 from sim.flight.jobs import PressJob
 from sim.sweep import run_sweep
+from sim.world.scene import ForceTorqueScene, WallScene
 
 
 @pytest.fixture
@@ -28,8 +32,7 @@ def flown(monkeypatch, tmp_path):
         if isinstance(job, PressJob):
             trace = press_trace(scene=scene, bias_n=0.05 if options.law == "qp" else 0.2)
             trace.law = options.law
-            for name, width in (("line_error_px", 2), ("friction_true", 2)):
-                trace.arrays[name] = 0.0 * trace.t[:, None].repeat(width, 1)
+            trace.arrays["friction_true"] = np.zeros((len(trace.t), 2))
             return trace
         return synthetic_trace(Errors(push_error_n=0.1), scene, options.law, options.seed)
 
@@ -55,9 +58,9 @@ def test_json_follows_the_contract(flown, tmp_path, capsys):
         assert cell["law"] in ("qp", "paper") and cell["completed"] == cell["n"]
         assert {"median", "low", "high"} == set(cell["metrics"]["settle_s"])
     assert json.loads((tmp_path / "run" / "force-hold.json").read_text()) == content
-    assert (tmp_path / "run" / "figures" / "force-hold-1.5kNm.png").stat().st_size > 10_000
+    assert (tmp_path / "run" / "figures" / "force-hold-force.png").stat().st_size > 10_000
     page = (tmp_path / "run" / "results.md").read_text()
-    assert "0.050" in page and "figures/force-hold-map.png" in page
+    assert "0.050" in page and "figures/force-hold-force.png" in page
     assert "| better |" not in page and "| worse |" not in page  # one pair decides nothing
 
 
@@ -193,6 +196,13 @@ def test_compare_pairs_two_folders(flown, capsys):
     content = json.loads(capsys.readouterr().out)
     assert content["cells"] and all(cell["differences"]["settle_s"]["median"] == 0.0 for cell in content["cells"])
     assert main(["compare", "a", "b"]) == 0
+
+
+def predicted_damping(law: str, variant: str, gain: float, stiffness: float, delay_s: float) -> float:
+    """Least damping ratio of the contact that the linear loop predicts."""
+    config = with_force_gain(VARIANTS[variant].apply(ibvs_qp.preset(law)), gain).controller
+    age = delay_s + 0.5 / ForceTorqueScene().rate_hz
+    return contact_mode_damping(config, stiffness, WallScene().damping_n_s_m, age).least_damping_ratio
 
 
 def test_gain_and_delay_take_damping_and_impedance_gives_it():

@@ -150,7 +150,7 @@ def test_parquet(
 ) -> None:
     # none of these ends the process; that is tested in tests/sim/storage/test_parquet.py
     monkeypatch.setattr(sim.sweep.tables, "refuse_what_aborts", lambda files: None)
-    table = pl.read_parquet(FOLDER.parents[2] / "docs" / "experiments" / "losses.parquet").head(40)
+    table = pl.read_parquet(FOLDER.parents[2] / "docs" / "experiments" / "fair.parquet").head(40)
     table.write_parquet(stream := io.BytesIO())
     good = stream.getvalue()
     random = np.random.default_rng(3)

@@ -130,5 +130,5 @@ def test_an_unknown_world_is_refused_in_one_line(flown, capsys, tmp_path, words)
     assert main([*words, "--world", "kind"]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
-    assert err.startswith("ibvs-qp: error: world 'kind' is refused; known worlds: datasheet, harsh, ideal")
+    assert err.startswith("ibvs-qp: error: world 'kind' is refused; known worlds: datasheet, field, harsh, ideal")
     assert not flown and not any(tmp_path.iterdir())

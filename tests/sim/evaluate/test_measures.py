@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -12,7 +13,8 @@ from synthetic_trace import Errors, synthetic_trace
 from sim.evaluate.measures import loss_figures, paint_figures, paint_timed_figures, press_figures
 from sim.evaluate.measures.press import push_reach
 from sim.evaluate.metrics import compute_metrics
-from sim.world.scene import PaintScene, Scene
+from sim.world.board import BoardGeometry
+from sim.world.scene import PaintScene, Scene, SurfaceScene
 
 LOW, HIGH = (1.2,) * 6, (52.56,) * 6
 
@@ -75,6 +77,15 @@ def test_figures_of_a_lost_rotor_begin_at_the_loss():
     assert figures["tilt_peak_deg"] == pytest.approx(3.0)
     assert figures["detached"] == 0.0
     assert loss_figures(press_trace()) == {}
+
+
+def test_a_descent_before_a_leaning_wall_is_along_gravity():
+    trace = press_trace(fault_s=6.0)
+    trace.arrays["propeller_clearance"] = np.full(len(trace.t), 0.3)
+    trace.scene = dataclasses.replace(trace.scene, surface=SurfaceScene(lean_deg=10.0))
+    down = BoardGeometry(trace.scene).down
+    trace.arrays["position"] = np.outer(0.5 * trace.t, down)
+    assert loss_figures(trace)["descent_peak_m_s"] == pytest.approx(0.5)
 
 
 def test_a_spin_after_a_loss_counts_its_full_turns():

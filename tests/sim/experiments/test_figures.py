@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
-
 import polars as pl
 import pytest
 from matplotlib.figure import Figure
-from press_trace import press_trace
+from synthetic_trace import synthetic_trace
 
 from sim.experiments.design import Choice, designs
-from sim.experiments.figures import Results, draw, force_hold
+from sim.experiments.figures import Results, draw, flights
 from sim.experiments.figures.common import CRASH
-from sim.experiments.figures.force_map import map_caption, map_cells
 from sim.experiments.figures.medians import plot_medians
 from sim.experiments.spec import experiment
 from sim.sweep.parts import PARAM
-
-GAINS, WALLS = (1.0, 5.0), (1500.0, 10000.0)
 
 
 def table_of(name: str, **figures: float) -> pl.DataFrame:
@@ -31,19 +26,6 @@ def table_of(name: str, **figures: float) -> pl.DataFrame:
     return pl.DataFrame(rows, schema_overrides={"log": pl.String}, infer_schema_length=None)
 
 
-def the_map(bad: float) -> pl.DataFrame:
-    """A map in which direct control deviates by `bad` at five times the gain on the soft wall, all else by 0.1 N."""
-    rows = []
-    for law, variant, gain, wall in itertools.product(("qp", "paper"), ("standard", "direct"), GAINS, WALLS):
-        worse = variant == "direct" and (gain, wall) == (5.0, 1500.0)
-        rows.append(
-            {"law": law, "variant": variant, "seed": 0, "completed": True, "contact_share": 1.0}
-            | {"force_std_n": bad if worse else 0.1, PARAM + "kind": "map"}
-            | {PARAM + "force_gain": gain, PARAM + "stiffness_n_m": wall, PARAM + "delay_s": 0.024}
-        )
-    return pl.DataFrame(rows)
-
-
 def test_failed_flights_are_crosses_and_enter_no_median():
     rows = pl.DataFrame({"completed": [True, True, False, False], PARAM + "x": [1.0] * 4, "y": [1.0, 3.0, 60.0, None]})
     axes = Figure().subplots()
@@ -53,42 +35,21 @@ def test_failed_flights_are_crosses_and_enter_no_median():
     assert list(middle.get_ydata()) == [2.0]  # type: ignore[arg-type]
 
 
-def test_the_caption_counts_the_cells_of_the_map():
-    shown, refuted = (map_caption(the_map(bad), pl.DataFrame()) for bad in (0.8, 0.2))
-    assert shown.startswith("Direct force control oscillates") and "but not at the shipped gains" in shown
-    assert "impedance 0 of 8 cells" in shown and "direct force control 2 of 8 cells" in shown
-    assert "none below 5 times" in shown
-    assert refuted.startswith("Direct force control does not oscillate") and "2 of 8 cells" not in refuted
-
-
-def test_a_hold_that_crashed_has_lost_the_wall():
-    table = the_map(0.1).with_columns(pl.col(PARAM + "force_gain").eq(1.0).alias("completed"))
-    cells = map_cells(table)
-    assert (cells["lost"] == (cells[PARAM + "force_gain"] == 5.0)).all()
-
-
 @pytest.mark.parametrize("logged", ["standard", "direct"])
-def test_a_variant_without_a_log_shows_no_reference(monkeypatch, tmp_path, logged):
+def test_stored_flights_have_the_figures_of_a_run_folder(monkeypatch, tmp_path, logged):
     table = table_of("force-hold", force_std_n=0.1, contact_share=1.0)
 
-    def trace(results, rows):
-        if rows["variant"].first() != logged:
-            return None
-        made = press_trace()
-        made.arrays["line_error_px"] = 0.0 * made.t[:, None].repeat(2, 1)
-        return made
-
-    monkeypatch.setattr(force_hold, "stored_trace", trace)
+    made = synthetic_trace()
+    monkeypatch.setattr(flights, "stored_trace", lambda _, rows: made if rows["variant"].first() == logged else None)
     figures = draw(Results(experiment("force-hold"), table, tmp_path))
-    panels = figures["force-hold-1.5kNm"][1].axes[:2]
-    empty, drawn = panels if logged == "direct" else panels[::-1]
-    assert len(drawn.lines) == 3
-    assert not empty.lines and empty.texts[0].get_text() == "not flown"
+    name = "force-hold" if logged == "standard" else "force-hold-direct"
+    maps = {f"force-hold-{variant}-map-force_std_n" for variant in ("standard", "direct")}
+    assert set(figures) == {f"{name}-force", f"{name}-image_error"} | maps
 
 
-def test_derating_without_a_reach_still_draws(tmp_path):
-    table = table_of("rotor-derate").with_columns(pl.lit(None, pl.Float64).alias("reach_n"))
-    assert draw(Results(experiment("rotor-derate"), table, tmp_path))
+def test_boxes_are_over_the_parameters_that_vary(tmp_path):
+    figures = draw(Results(experiment("noise-sweep"), table_of("noise-sweep", path_rms_m=1.0), tmp_path))
+    assert [len(figure.axes) for _, figure in figures.values()] == [2] and "noise-sweep-path_rms_m" in figures
 
 
 @pytest.mark.parametrize(

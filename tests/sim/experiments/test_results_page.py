@@ -67,6 +67,14 @@ def test_failed_flights_are_compared_by_the_sign_test(qp, analytic, outcome):
     assert found.outcome is outcome
 
 
+def test_a_figure_of_which_more_is_better_is_worse_when_it_is_less():
+    qp, analytic = (
+        rows("paint", law, "standard", [share] * 6, "contact_share") for law, share in (("qp", 0.90), ("paper", 0.99))
+    )
+    found = one("paint", "contact_share", qp, analytic)
+    assert found.worse == pytest.approx(9.0) and found.outcome is Outcome.LOST  # [%]
+
+
 def test_an_opponent_meets_the_same_variant_of_the_qp_and_a_part_meets_the_whole():
     cases = [("qp", "standard", 1.0), ("qp", "no-reach-check", 2.0), ("paper", "standard", 3.0)]
     cases += [("paper", "no-reach-check", 5.0), ("paper", "no-reach-check-box", 6.0), ("paper", "shared-gains", 4.0)]

@@ -40,7 +40,7 @@ def test_every_experiment_is_complete(name):
     ("old", "new", "message"),
     [
         ("at_most = 6.5", "at_mots = 6.5", "did you mean 'at_most'"),
-        ("at_most = 6.5", "at_most = 6.5\nat_least = 1.0", "either at_most or at_least"),
+        ("at_most = 6.5", "at_most = 6.5\nat_least = 1.0", "needs one of at_most"),
         ('statistic = "every flight"', 'statistic = "mean"', "allowed are median, every flight"),
         ("seeds = 10", "seeds = 0", "seeds"),
         ("levels.stiffness_n_m = [5000.0]", "levels.stiffness_n_m = 5000.0", "quick"),

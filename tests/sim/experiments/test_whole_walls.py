@@ -9,7 +9,7 @@ from ibvs_qp.pilot.painting.pattern import COLUMNS, CORNERS, PATTERNS
 from sim.experiments.scenes import short_job
 from sim.experiments.whole_walls import __main__ as command
 from sim.experiments.whole_walls import flights
-from sim.experiments.whole_walls.figures import failures, lines
+from sim.experiments.whole_walls.figures import failures, outcomes
 from sim.experiments.whole_walls.flights import SCENES, SETS, paint_run, runs_of
 from sim.experiments.whole_walls.scenes import CLUTTER, HEIGHT_M, STROKES, WIDTH_M, walls
 from sim.experiments.whole_walls.vision_faults import faulty_jobs
@@ -18,7 +18,7 @@ from sim.sweep.parts import frame
 from sim.world.worlds import in_world
 
 LAWS = ("qp", "paper")
-PLACE = "place error of the last stroke over that of stroke 5, medians"
+PLACE = "place error of the last stroke over that of stroke 5"
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -74,60 +74,47 @@ def test_hidden_guides_lie_before_the_tip_in_every_pattern():
 
 
 def table(*rows):
-    """Made-up flights of set datasheet: (law, strokes, done, claimed, coverage, place error of stroke 5, last one)."""
+    """Made-up flights of set datasheet: (done, claimed, coverage, growth of the place error)."""
+    facts = {"experiment": "datasheet", "law": "qp", "variant": "standard", "reason": "the end"}
     return frame(
         [
-            {
-                "experiment": "datasheet",
-                "law": law,
-                "variant": "standard",
-                "seed": seed,
-                "claimed": claimed,
-                "reason": "the end",
-                "param.strokes": strokes,
-                "done": float(done),
-                "coverage": coverage,
-                "place_early_m": early,
-                "place_last_m": last,
-            }
-            for seed, (law, strokes, done, claimed, coverage, early, last) in enumerate(rows)
+            facts | {"seed": seed, "claimed": claimed, "done": done, "coverage": coverage, "place_growth": growth}
+            for seed, (done, claimed, coverage, growth) in enumerate(rows)
         ]
     )
 
 
-def planned(*strokes):
-    return [SimpleNamespace(experiment="datasheet", law="qp", params={"strokes": count}) for count in strokes]
+def planned(count):
+    return [SimpleNamespace(experiment="datasheet", law="qp")] * count
 
 
 def test_figures_of_good_flights_meet_their_goals():
-    rows = table(("qp", 5, 1, True, 0.99, 0.009, 0.009), ("qp", 10, 1, True, 0.981, -0.002, 0.003))
-    found = {line.figure: line for line in lines(rows, planned(5, 10, 20))}
+    found = {line.words: line for line in outcomes(table((1.0, True, 0.99, None), (1.0, True, 0.981, 1.5)), planned(3))}
     assert all(line.met for line in found.values())
-    place = found[f"datasheet, qp: {PLACE}"]
-    assert (place.value, place.n, place.planned) == (pytest.approx(1.5), 1, 2)
-    complete = found["datasheet, qp: complete"]
-    assert complete.cells == ("datasheet, qp: complete", "100.0 %", ">= 100 %", "2 of 3", "yes")
+    assert found[f"datasheet, qp: {PLACE}"].cells[2:] == ("1.5", "1.5", "1 of 1, 3 planned", "yes")
+    assert found["datasheet, qp: complete"].cells[1] == ">= 1 in 100 %"
 
 
 @pytest.mark.parametrize(
     ("row", "missed"),
     [
-        (("qp", 10, 0, True, 0.99, 0.001, 0.001), {"complete", "false claims"}),
-        (("qp", 10, 0, False, 0.99, 0.001, 0.001), {"complete"}),
-        (("qp", 10, 1, False, 0.99, 0.001, 0.001), {"claimed, of the complete flights"}),
-        (("qp", 10, 1, True, 0.979, 0.001, 0.001), {"coverage, least"}),
-        (("qp", 10, 1, True, 0.99, 0.001, -0.0021), {PLACE}),
+        ((0.0, True, 0.99, 1.0), {"complete", "false claims"}),
+        ((0.0, False, 0.99, 1.0), {"complete"}),
+        ((1.0, False, 0.99, 1.0), {"claimed, of the complete flights"}),
+        ((1.0, True, 0.979, 1.0), {"coverage"}),
+        ((1.0, True, 0.99, 2.1), {PLACE}),
+        ((None, False, None, None), {"complete", "coverage", PLACE}),
     ],
 )
 def test_every_goal_can_be_missed(tmp_path, row, missed):
     rows = table(row)
-    assert {line.figure.removeprefix("datasheet, qp: ") for line in lines(rows, planned(10)) if not line.met} == missed
+    found = {line.words.removeprefix("datasheet, qp: ") for line in outcomes(rows, planned(1)) if not line.met}
+    assert found == missed
     assert len(list(failures(rows, tmp_path))) == int(missed != {PLACE})
 
 
 def test_figures_without_flights_have_no_value():
-    found = lines(frame([]), planned(5, 10))
-    assert all(line.n == 0 and line.cells[-1] == "–" for line in found)
+    assert all(line.met and line.cells[-1] == "–" for line in outcomes(frame([]), planned(2)))
 
 
 @pytest.mark.slow
@@ -143,8 +130,8 @@ def test_parts_add_up_and_are_not_flown_again(monkeypatch, tmp_path, capsys):
         code = command.main()
         return code, capsys.readouterr().out
 
-    assert "1 of 2" in fly("--part", "1", "--of", "2")[1]
+    assert "1 of 1, 2 planned" in fly("--part", "1", "--of", "2")[1]
     code, text = fly("--part", "2", "--of", "2")
-    assert code == 0 and "2 of 2" in text
+    assert code == 0 and "2 of 2, 2 planned" in text
     monkeypatch.setattr("sim.sweep.flying.fly", None)  # nothing flies any more
     assert fly("--part", "0")[0] == 0

@@ -22,10 +22,12 @@ from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import LANDED
+from sim.world.board import BoardGeometry
 from sim.world.canvas import Canvas
+from sim.world.errors import WorldErrors, world_errors
 from sim.world.painted_edges import BIN_M
 from sim.world.plant import Plant
-from sim.world.scene import Scene
+from sim.world.scene import Scene, SurfaceScene
 
 OPTIONS = FlightOptions(features="geometric", video=False)
 
@@ -156,6 +158,40 @@ def test_a_wall_that_stiffens_under_the_tip_is_dented_less_and_pushes_as_before(
         pushes[ratio] = plant.pushes[0]
     assert pushes[1.0] == pytest.approx(1500.0 * 0.003, rel=0.02)
     assert pushes[5.0] == pytest.approx(pushes[1.0], rel=0.05)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_bristles_keep_another_wall_and_push_as_before(beside):
+    scene, tip = Scene(errors=dataclasses.replace(WorldErrors(), brush=world_errors("field").brush)), (0.003, 0.7, -1.5)
+    if beside:
+        tip = (scene.board.gap_m + 0.003, -0.02, -1.5)
+    pushes = {}
+    for ratio in (1.0, 5.0):
+        plant = at_rest(Plant(scene), np.array(tip) - Plant(scene).vehicle.tip_position_m)
+        plant.step(plant.thrusts_actual)  # the tip comes before the wall's face
+        at_rest(plant, np.array(tip) - plant.vehicle.tip_position_m)
+        OtherWall(stiffness_ratio=ratio, friction=1.2).strike(SimpleNamespace(plant=plant), None)
+        plant.step(plant.thrusts_actual)
+        pushes[ratio] = plant.pushes[0]
+        assert plant.model.pair_friction[0, 0] >= 1.2
+    assert pushes[1.0] == pytest.approx(1500.0 * (1.0 + 3.0 * scene.errors.brush.progression_per_mm) * 0.003, rel=0.1)
+    assert pushes[5.0] == pytest.approx(pushes[1.0], rel=0.1)
+
+
+@pytest.mark.parametrize("settings", [SurfaceScene(kind="cylinder", radius_m=1.5), SurfaceScene(lean_deg=10.0)])
+def test_a_push_is_level_and_a_board_moves_along_its_normal_on_every_wall(settings):
+    scene = Scene(surface=settings)
+    plant, pushed = Plant(scene), Plant(scene)
+    before = plant.tip
+    BoardMoved(away_m=0.1).strike(SimpleNamespace(plant=plant), None)
+    assert plant.tip - before == pytest.approx([-0.1, 0.0, 0.0])
+    SidePush(force_n=(30.0, 0.0, 0.0)).strike(SimpleNamespace(plant=pushed), None)
+    plant = Plant(scene)
+    for each in (plant, pushed):
+        for _ in range(10):
+            each.step(each.thrusts_actual)
+    gained = BoardGeometry(scene).from_ned.T @ (pushed.rotation @ pushed.velocity - plant.rotation @ plant.velocity)
+    assert gained[0] > 0.15 and abs(gained[2]) < 1e-3
 
 
 def test_a_board_that_moves_away_is_farther_and_the_speed_stays():

@@ -12,6 +12,7 @@ from ibvs_qp.config.errors import ConfigError
 from sim.flight.jobs import PaintJob, PressJob
 from sim.flight.options import FlightOptions, pilot_config, unsupervised
 from sim.flight.preflight import PLACE_TOLERANCE_M, check_job, job_problems, oldest_s
+from sim.world.plant import Plant
 from sim.world.plant_scene import PlantScene
 from sim.world.scene import (
     BoardScene,
@@ -21,6 +22,7 @@ from sim.world.scene import (
     PaintScene,
     Scene,
     StartScene,
+    SurfaceScene,
     WallScene,
     WindScene,
 )
@@ -215,6 +217,24 @@ def test_start_with_a_propeller_at_the_wall_is_refused():
     short = dataclasses.replace(config, controller=dataclasses.replace(config.controller, vehicle=vehicle))
     (text,) = [text for text in job_problems(believed, short, "geometric") if text.startswith("start.")]
     assert "start.distance_m" in text and "start.yaw_deg = 20 deg" in text
+
+
+@pytest.mark.parametrize("job", [None, PressJob()])
+def test_a_start_with_a_propeller_in_the_far_side_of_a_tank_is_refused(job: PressJob | None) -> None:
+    def found(distance_m: float) -> list[str]:
+        tank = SurfaceScene(kind="cylinder", radius_m=1.5, side="concave")
+        scene = Scene(surface=tank, start=StartScene(distance_m=distance_m))
+        clearance = min(Plant(scene, seed=seed).propeller_clearance for seed in range(10))
+        config = pilot_config(scene, FlightOptions(features="geometric"))
+        problems = job_problems(scene, config, "geometric", job)
+        assert not problems or clearance < 0.05
+        return problems
+
+    assert found(1.6) == []
+    assert found(1.9) == [
+        "start.distance_m = 1.9 m is refused: allowed is [0.15, 1.67] m: no propeller starts at the wall "
+        "(start.yaw_deg = 0 deg)"
+    ]
 
 
 def test_several_problems_make_one_line():

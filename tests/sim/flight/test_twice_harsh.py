@@ -15,7 +15,7 @@ WORLD = "twice_harsh"
 
 @pytest.mark.slow
 def test_twice_harsh() -> None:
-    """Nine of ten flights are the goal (`sim.experiments.law_goals`); one may overlap too much where it sways most."""
+    """Nine of ten flights are the goal (`sim/experiments/goals`); one may overlap too much where it sways most."""
     completed = 0
     for seed in range(4):
         trace = fly(in_world(Scene(), WORLD), FlightOptions(seed=seed, features="geometric", law="qp", video=False))

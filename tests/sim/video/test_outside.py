@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -74,7 +76,7 @@ def test_the_vehicle_is_where_the_log_says(trace, camera):
     background = view.background()
     changed = np.abs(view.draw(tick).astype(int) - background).max(axis=-1) > 60
     vehicle = flown_vehicle(trace)
-    pose = vehicle_pose(trace, vehicle, tick)
+    pose = vehicle_pose(trace, tick)
     rotors = FLIP * vehicle.geometry.positions @ pose[:3, :3].T + pose[:3, 3]
     motors = camera.project(np.vstack((pose[:3, 3], rotors - 0.024 * pose[:3, 2])))
     for column, row in np.rint(motors).astype(int):
@@ -89,9 +91,14 @@ def test_the_vehicle_is_where_the_log_says(trace, camera):
 def test_the_tip_of_the_pose_is_the_logged_tip(trace):
     vehicle = flown_vehicle(trace)
     for tick in (0, 900, len(trace.t) - 1):
-        pose = vehicle_pose(trace, vehicle, tick)
+        pose = vehicle_pose(trace, tick)
         place = pose[:3, :3] @ (FLIP * vehicle.tip_position_m) + pose[:3, 3]
         assert np.allclose(FLIP * place, trace.tip[tick], atol=1e-12)
+
+
+def test_a_pose_is_that_of_the_body_and_not_of_a_tip_in_the_chart_of_a_round_wall(trace):
+    bent = dataclasses.replace(trace, arrays=trace.arrays | {"tip": trace.tip + np.array((0.0, 0.1, 0.0))})
+    assert np.array_equal(FLIP * vehicle_pose(bent, 900)[:3, 3], trace.position[900])
 
 
 def test_paint_appears_where_the_brush_has_pressed_and_not_before(trace, camera):

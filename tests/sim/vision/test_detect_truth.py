@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ibvs_qp.frames import align_line
-from ibvs_qp.vision.lines.guides import GuideKeeper
-from ibvs_qp.vision.lines.line_state import TrackState
+from ibvs_qp.vision.lines.refine import RefinedLine
+from ibvs_qp.vision.lines.tracks import TrackState
+from ibvs_qp.vision.perception import GuideKeeper
 from sim.detection.own import OwnMethod
 from tests.support.truth import FAMILIES, TruthScene, Variation, render_frame, sample_scene
 from tests.support.truth.accuracy import Errors, line_errors, measure_family
@@ -123,29 +124,23 @@ def test_following_keeps_identities_and_stays_right() -> None:
     assert len(set(identities.values())) == len(identities)
 
 
+ENDS = np.array([[-0.3, 0.0], [0.3, 0.0]])
+
+
 def top(identity: int, score: float) -> TrackState:
     """A level track with the surface below it."""
     return TrackState(
         track_id=identity,
+        line=RefinedLine(
+            0.0, 0.5 * math.pi, np.eye(2), ENDS, ("end", "end"), 1.0, 0.1, 300.0, np.zeros(3), 600.0 * ENDS
+        ),
         role="horizontal",
         kind="board",
         surface_side=1,
-        rho=0.0,
-        theta=0.5 * math.pi,
-        covariance=np.eye(2),
-        segment=np.array([[-0.3, 0.0], [0.3, 0.0]]),
-        ends=("end", "end"),
-        weight=1.0,
-        confirmed=True,
-        seen=True,
-        age=3,
-        inlier_share=1.0,
-        rms_px=0.1,
-        length_px=300.0,
         score=score,
-        confidence=0.9,
+        certainty=0.9,
         borders_plane=True,
-        hint="",
+        theta=0.5 * math.pi,
     )
 
 

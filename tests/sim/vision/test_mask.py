@@ -9,7 +9,7 @@ import pytest
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision.config import MaskConfig
-from ibvs_qp.vision.picture.mask import vehicle_mask
+from ibvs_qp.vision.picture.layout import vehicle_mask
 from sim.sensors.cameras.arm import vehicle_layer
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.world.scene import Scene

@@ -15,7 +15,7 @@ from ibvs_qp.measurement import HORIZONTAL, RgbdFrame
 from ibvs_qp.vision import VisionConfig
 from ibvs_qp.vision.paper import PaperConfig, PaperPerception, PaperPipeline
 from ibvs_qp.vision.paper.normals import NormalImage
-from ibvs_qp.vision.picture.mask import vehicle_mask
+from ibvs_qp.vision.picture.layout import vehicle_mask
 from sim.commands import cli
 from sim.world.scene import Scene
 

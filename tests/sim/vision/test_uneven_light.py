@@ -9,8 +9,8 @@ import pytest
 from rendered_scenes import Flight, World, board_edge, row_edge, scene_of, stroke_row
 
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.appearance.labels import LIGHT_STEP
-from ibvs_qp.vision.appearance.light import LightField, fit_light, products
+from ibvs_qp.vision.appearance.colors import LIGHT_STEP
+from ibvs_qp.vision.appearance.light import CELL_BITS, LightField, fit_light, products
 
 FRAMES, SETTLE = 14, 8
 #: Exposure that keeps a white board in 1.4 times the light below white.
@@ -101,7 +101,8 @@ def test_light_grows_from_the_middle_to_all_of_the_board() -> None:
     field, board = found
     assert np.abs(board / WHITE - 0.75).max() < 0.02
     assert np.abs(field.at(at) - np.log(light / 0.75)).max() < 0.06
-    levels = field.levels_at(*(at * 625.2 + (319.5, 239.5)).T)
+    column, row = (at * 625.2 + (319.5, 239.5)).astype(int).T
+    levels = field.levels[row >> CELL_BITS, column >> CELL_BITS]
     assert np.abs((levels.astype(float) + field.steps[0]) * LIGHT_STEP - np.log(light / 0.75)).max() < 0.06 + LIGHT_STEP
 
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from sim.world.errors import AirErrors
 from sim.world.plant import Plant
 from sim.world.plant_scene import PlantScene
-from sim.world.random_streams import stream
 from sim.world.scene import Scene, StartScene, WindScene
 from sim.world.wind import Wind
 
@@ -36,7 +36,7 @@ def test_air_acts_at_the_true_centre_of_mass():
 
 
 def test_gusts_have_their_rms_and_time_constant():
-    wind = Wind(WindScene(gust_n_rms=2.0), 0.9, 0.004, stream(1, "wind"))
+    wind = Wind(WindScene(gust_n_rms=2.0), AirErrors(), np.eye(3), 0.9, 0.004, 1)
     gusts = np.array([wind.force(np.zeros(3)) for _ in range(100_000)])
     np.testing.assert_allclose(gusts.std(), 2.0, rtol=0.1)  # 400 s hold 200 independent gusts per axis
     lag = 250

@@ -10,6 +10,7 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
+from sim.flight.options import FlightOptions, pilot_config
 from sim.world.errors import PROFILES, WorldErrors, single_errors, world_errors, world_names
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, OWN, in_world, world_name
@@ -36,6 +37,8 @@ HARSH = {
 }  # fmt: skip
 #: Fields that shape an error but are no size.
 SHAPES = {"attitude.wander_time_s", "rotors.noise_time_s", "depth.baseline_m"}
+#: Sections of `field` alone.
+OUTSIDE = ("air.", "arm.", "brush.", "relief.")
 
 
 def flat(errors: WorldErrors) -> dict[str, Any]:
@@ -59,6 +62,8 @@ def test_a_profile_is_at_least_as_unkind_as_agreed(world, least):
 def test_every_error_is_set_and_harsh_is_harsher_than_datasheet():
     datasheet, harsh = flat(world_errors("datasheet")), flat(world_errors("harsh"))
     for name in datasheet.keys() - SHAPES:
+        if name.startswith(OUTSIDE):
+            continue
         assert datasheet[name] not in (0.0, (0.0, 0.0, 0.0)), name
         mild, hard = datasheet[name], harsh[name]
         if name == "force_torque.overload_n":  # a sensor that saturates earlier is worse
@@ -72,18 +77,19 @@ def test_every_number_of_a_profile_has_a_comment(world):
     assert [line for line in lines if re.match(r"\w+ =", line) and " # " not in line] == []
 
 
-def test_errors_come_one_at_a_time():
-    world = world_errors("harsh")
+@pytest.mark.parametrize("name", ["harsh", "field"])
+def test_errors_come_one_at_a_time(name):
+    world, ideal = world_errors(name), flat(WorldErrors())
     singles = single_errors(world)
-    assert set(singles) == flat(world).keys() - SHAPES
-    for name, alone in singles.items():
-        changed = {key for key, value in flat(alone).items() if value != flat(WorldErrors())[key]}
-        assert changed == {name} and flat(alone)[name] == flat(world)[name]
+    assert set(singles) == {key for key, value in flat(world).items() if value != ideal[key]}
+    for error, alone in singles.items():
+        changed = {key for key, value in flat(alone).items() if value != ideal[key]}
+        assert changed == {error} and flat(alone)[error] == flat(world)[error]
     assert single_errors(world_errors("ideal")) == {}
 
 
 def test_worlds_have_names(tmp_path):
-    assert world_names() == ["datasheet", "harsh", "ideal", "twice_harsh"] and DEFAULT_WORLD in world_names()
+    assert world_names() == ["datasheet", "field", "harsh", "ideal", "twice_harsh"] and DEFAULT_WORLD in world_names()
     assert {name: world_name(in_world(Scene(), name).errors) for name in world_names()} == {
         name: name for name in world_names()
     }
@@ -107,7 +113,14 @@ def test_a_wrong_file_is_refused_by_name(tmp_path, content, said):
 
 
 def test_an_unknown_world_is_refused_with_the_known_ones():
-    with pytest.raises(ConfigError, match="world 'kind' is refused; known worlds: datasheet, harsh, ideal"):
+    with pytest.raises(ConfigError, match="world 'kind' is refused; known worlds: datasheet, field, harsh, ideal"):
         in_world(Scene(), "kind")
     with pytest.raises(ConfigError, match=r"cannot read nowhere\.toml"):
         in_world(Scene(), "nowhere.toml")
+
+
+@pytest.mark.parametrize(("world", "trim_deg"), [("datasheet", 0.0), ("harsh", 0.0), ("field", 2.0)])
+def test_jobs_outside_permit_a_tilt(world: str, trim_deg: float) -> None:
+    for law in ("qp", "paper"):
+        config = pilot_config(in_world(Scene(), world), FlightOptions(law=law))
+        assert config.controller.limits.trim_deg == trim_deg

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.frames import rotation_from_vector
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from tests.support.truth.devices import Device
 from tests.support.truth.scenes import TruthScene
 

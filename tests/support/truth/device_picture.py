@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from sim.sensors.image_motion import image_velocity
 from tests.support.truth.scenes import TruthScene
 

@@ -124,7 +124,7 @@ void ibvs_analytic_thrusts(const ibvs_controller *c, ibvs_real thrusts[IBVS_ROTO
   }
   const ibvs_real *normal = &c->results[IBVS_OUT_NORMAL], weight = c->results[IBVS_OUT_CONTACT_WEIGHT];
   for (uint32_t i = 0; i < 3; ++i) {
-    along += normal[i] * wrench[i];
+    along += normal[i] * wrench[i] + c->results[IBVS_OUT_TURNING_LEVER + i] * acceleration[3 + i];
   }
   for (uint32_t i = 0; i < 6; ++i) {
     wrench[i] += i < 3 ? normal[i] * weight * (c->results[IBVS_OUT_PUSH_COMMAND] - along) : 0;

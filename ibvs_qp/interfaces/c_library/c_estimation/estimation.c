@@ -205,6 +205,15 @@ static void correct(ibvs_flight *f, const ibvs_features *features, int64_t stamp
     *rejected |= count > 0 ? IBVS_REJECT_LINES : 0;
     return;
   }
+  const ibvs_real *curvature = features->curvature;
+  bool sound_curvature = true;
+  for (uint32_t i = 0; i < 3; ++i) {
+    sound_curvature = sound_curvature && r_fabs(curvature[i]) <= IBVS_CURVATURE_BOUND;
+  }
+  *rejected |= sound_curvature ? 0 : IBVS_REJECT_PLANE;
+  for (uint32_t i = 0; i < 3; ++i) {
+    f->predict_inputs[IBVS_PREDICT_CURVATURE + i] = sound_curvature ? curvature[i] : 0;
+  }
   if (stamp_ns < f->gap_end_ns) { /* the state at a capture before a gap is not known */
     return;
   }

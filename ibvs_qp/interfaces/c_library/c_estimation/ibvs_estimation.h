@@ -48,6 +48,7 @@ typedef struct {
   int64_t stamp_ns;
   bool has_plane;
   ibvs_real plane[4];               /* wall (A, B, C, D) in C, D != 0 */
+  ibvs_real curvature[3];           /* of the wall: right right, right down, down down [1/m], > 0 where it bulges */
   bool has_velocity;
   ibvs_real velocity[3];            /* of the centre of mass in B [m/s] */
   ibvs_real velocity_covariance[9]; /* large in directions that were not observed */

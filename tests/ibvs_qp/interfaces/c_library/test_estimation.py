@@ -107,11 +107,13 @@ def disturbed(tick: int, features: FeatureFrame) -> FeatureFrame:
         changes["lines"] = tuple(dataclasses.replace(line, rho=line.rho + 0.5) for line in lines)
     elif 800 <= tick < 1000 and features.velocity is not None:
         changes["velocity"] = features.velocity + np.array([0.0, 0.5, 0.0])
+        changes["curvature"] = np.array([0.6, 0.1, -0.3])
     elif 1000 <= tick < 1050:
         changes["stamp_ns"] = max(features.stamp_ns - 400_000_000, 0)
     elif 1100 <= tick < 1200:
         changes |= {
             "plane": (0.0, 0.0, 2.0, 1.0),
+            "curvature": np.array([0.6, math.nan, 0.0]),
             "lines": tuple(dataclasses.replace(line, rho=math.nan) for line in lines),
         }
     elif 1200 <= tick < 1250:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ibvs_qp.frames import rotation_from_vector
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 
 INTRINSICS = (520.0, 515.0, 322.0, 238.0)
 LENSES = {

@@ -12,7 +12,7 @@ import pytest
 from ibvs_qp.frames import R_BODY_CAMERA
 from ibvs_qp.measurement import FeatureFrame, LineFeature
 from ibvs_qp.pilot.rolling_shutter import RollingShutter
-from ibvs_qp.vision.picture.lens import Lens
+from ibvs_qp.vision.picture.camera import Lens
 from sim.detection.own import OwnMethod
 from tests.support.truth import FAMILIES, TruthFrame, TruthScene, render_frame, sample_scene
 from tests.support.truth.accuracy import line_errors, measure_family
