@@ -91,9 +91,9 @@ class CheckedLaw(Rebuilt):
         return self.answer(measurement, reference, contact)
 
     def answer(self, measurement: Any, reference: Any, contact: Any, trusted: bool = False) -> Command:
-        """The same for a caller that has set numpy's error state, as `Pilot`.
+        """Thrusts for one tick, as `step`, for a caller that has set numpy's error state, as `Pilot` has.
 
-        ``trusted`` inputs have numbers that the caller has checked: one fence stands for the checks.
+        The numbers of ``trusted`` inputs were checked by the caller: one test of their bounds replaces the checks.
         """
         try:
             inputs = self.check(measurement, reference, contact, trusted)

@@ -263,8 +263,7 @@ class Model:
     def force_along_normal(self) -> ca.SX:
         """Mass times the acceleration along n without contact, as a function of the thrusts [N].
 
-        In contact it is the tip's, in free flight that of the centre of mass: a vehicle that turns away from the wall
-        does not turn to keep its distance.
+        In contact with a leaning wall it is the tip's, else that of the centre of mass.
         """
         turning = ca.dot(self.turning_lever, self.acceleration[3:])
         return ca.dot(self.normal, self.wrench[:3]) + self.contact_weight * turning
@@ -275,8 +274,8 @@ class Model:
 
         .. math:: m (n^T d) (r \times d)
 
-        with the tip r and gravity's direction d. It is zero on an upright wall, however the vehicle tilts: a tilt that
-        the push bought there would grow with it, and few rotors may be left to take it back.
+        with the tip r and gravity's direction d. A level vehicle has this lever. That of a tilt is left out: the rows
+        of roll and pitch keep tilts small, and the push shall not turn the vehicle before an upright wall.
         """
         vehicle, down = self.config.vehicle, self.body.down
         lean = ca.dot(self.wall.normal, down)

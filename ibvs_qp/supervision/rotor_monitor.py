@@ -158,13 +158,10 @@ class RotorMonitor:
         scale = min(float(self.scale[rotor]) * ratio, 1.0)
         again = sum(other == rotor for _, other in self._changes) >= MOST_CHANGES
         weak = not again and scale >= LEAST_SCALE and scale != self.scale[rotor]
-        if not weak and self.scale[rotor] == 1.0:
+        if not weak:
             return False
         self.scale = self.scale.copy()
-        self.scale[rotor] = scale if weak else 1.0
-        if not weak:
-            self.note = f"{self._names[rotor]}: no scale explains its thrust"
-            return False
+        self.scale[rotor] = scale
         self._changes.append((time_s, rotor))
         self._suspects.clear()
         self.note = f"{self._names[rotor]} gives {100.0 * scale:.0f} % of its thrust"
@@ -203,6 +200,7 @@ class RotorMonitor:
         if self.scale[rotor] != 1.0:  # the limit explains the thrust that the scale was for
             self.scale = self.scale.copy()
             self.scale[rotor] = 1.0
+            self.note = f"{self._names[rotor]}: no scale explains its thrust"
         if len(self._found) >= COMMON:
             # One limit for all: two rotors that keep theirs would leave the others thrusts that they cannot give.
             lower[:], found = self._box[0], [self._names.index(name) for name in self._found]

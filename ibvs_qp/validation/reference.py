@@ -35,10 +35,10 @@ class ReferenceGate:
     def trust(self, reference: Reference) -> bool:
         """Accept a reference whose caller has made it of checked numbers, as `Pilot`.
 
-        A second fence: bounds of the numbers, finite lines.
+        A second fence: bounds of the numbers, finite lines. Types of lines and their fields are not checked.
 
         Returns:
-            False, and nothing accepted, where `check` might change anything.
+            False, and nothing accepted, where `check` might change a number.
         """
         entries, lines = REFERENCE.trusted(reference), reference.lines
         largest = sum([abs(line.rho) + abs(line.theta) for line in lines])  # not finite if one entry is not

@@ -85,7 +85,7 @@ class PaintScene(Checked):
     overlap_m: float = setting(0.008, "overlap of neighbouring strokes", unit="m", low=0.0, high=0.1)
     speed_m_s: float = setting(0.10, "painting speed", unit="m/s", low=0.01, high=0.5)
     push_n: float = setting(5.0, "push force", unit="N", low=0.5, high=40.0)
-    trim_deg: float = setting(0.0, "`limits.trim_deg` at least, a permission of the job", unit="deg", low=0.0, high=10.0)
+    trim_deg: float = setting(0.0, "`limits.trim_deg` that the job permits", unit="deg", low=0.0, high=5.0)
 
     @property
     def pitch_m(self) -> float:

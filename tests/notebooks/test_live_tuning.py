@@ -23,7 +23,7 @@ from sim.notebook.render import NOTEBOOKS
 from sim.notebook.short import SHORT_VARIABLE
 
 #: Longest wait for the notebook to be served, or to be idle [s]; steps of a slider that is dragged, and between them.
-PATIENCE_S, STEPS, STEP_S = 120.0, 10, 0.05
+PATIENCE_S, STEPS, STEP_S = 400.0, 10, 0.05
 _ELEMENT = re.compile(r"object-id='([^']+)'[^>]*><marimo-(?:slider|button|text)[^>]*?data-label='([^']*)'")
 
 

@@ -166,7 +166,7 @@ def test_all_rotors_at_a_limit_miss_lift_and_keep_their_lower_limits() -> None:
 
 
 def test_three_rotors_at_a_limit_have_it_in_common_with_the_others() -> None:
-    """Each limited by itself, the others were commanded 20 N of their 13 N, and the vehicle turned over."""
+    """Each limited by itself, the others were commanded 20 N of their 13 N, and the vehicle came down."""
     watch, wanted = monitor(), np.array([20.0, 20.0, 18.0, 11.0, 10.0, 9.0])
     for tick in range(60):
         watch.update(np.maximum(wanted - 13.0, 0.0), 0.1, wanted, tick * 0.004)

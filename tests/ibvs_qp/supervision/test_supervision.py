@@ -166,5 +166,5 @@ def test_repeated_pictures_of_a_camera_with_noise_are_no_news() -> None:
 
 def test_the_command_tells_state_and_reasons() -> None:
     assert watched(5).explained(COMMAND) is COMMAND
-    told = watched(30, down=(0.3, 0.0, 0.954)).explained(COMMAND)
-    assert told.safety is SafetyState.RETREAT and told.safety_reasons[0].startswith("tilt: ")
+    command = watched(30, down=(0.3, 0.0, 0.954)).explained(COMMAND)
+    assert command.safety is SafetyState.RETREAT and command.safety_reasons[0].startswith("tilt: ")

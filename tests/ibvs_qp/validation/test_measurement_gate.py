@@ -103,4 +103,4 @@ def test_a_trusted_reference_passes_where_no_check_changes_it(broken: dict[str, 
     if trusted:
         assert str(gate.last) == str(twin.last), "both stay in force where the next one is refused"
     else:
-        assert str(gate.last) == str(ReferenceGate(2).last), "nothing is kept of what is refused"
+        assert str(gate.last) == str(ReferenceGate(2).last), "a refused reference changes nothing"

@@ -120,7 +120,12 @@ def test_paint() -> None:
 
 
 def test_experiment(printed: list[object]) -> None:
-    verdict = {"experiment": "paint", "figure": "height error, peak", "cell": {"wall": 10000.0, "world": "datasheet"}}
+    verdict = {
+        "experiment": "paint",
+        "law": "paper",
+        "figure": "height error, peak",
+        "cell": {"wall": 10000.0, "world": "datasheet"},
+    }
     verdict |= {"variant": "no-reach-check", "least": False, "unit": "rad/s^2", "median": WIDE, "held": 10, "n": 10}
     content = {"verdicts": [verdict | {"bound": WIDE, "words": "not certain (3 of 10)"}]}
     experiment._print_verdicts(Console(), content, {"paint": ["ideal", "datasheet"]})

@@ -11,7 +11,7 @@ import sys
 import pytest
 
 #: Longest wait for its address, and for its end, on a loaded machine [s].
-READY_S, END_S = 120.0, 60.0
+READY_S, END_S = 400.0, 60.0
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 #: Messages of the page's libraries that are no errors of the page.
 HARMLESS = re.compile(r"deprecated|GPU stall|favicon", re.IGNORECASE)
 #: Longest wait for the page on a loaded machine [s].
-PATIENCE_S = 120.0
+PATIENCE_S = 400.0
 
 
 def wait_for(what, condition) -> None:

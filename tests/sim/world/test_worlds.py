@@ -10,8 +10,8 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import dump_toml
-from sim.world.errors import PROFILES, WorldErrors, single_errors, world_errors, world_names
 from sim.flight.options import FlightOptions, pilot_config
+from sim.world.errors import PROFILES, WorldErrors, single_errors, world_errors, world_names
 from sim.world.scene import Scene
 from sim.world.worlds import DEFAULT_WORLD, OWN, in_world, world_name
 
