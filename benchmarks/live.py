@@ -1,6 +1,6 @@
 """Load of ``ibvs-qp live``: headless clients that read everything; frames per second of each, late ticks, cores used.
 
-Example: python benchmarks/live.py --clients 10 --seconds 30
+Example: python benchmarks/live.py --clients 10
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def main() -> None:
     """Fly, connect, read, and print."""
     parser = argparse.ArgumentParser(description="Load of ibvs-qp live")
     parser.add_argument("--clients", type=int, default=10)
-    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--port", type=int, default=8765)
     given = parser.parse_args()
     command = [

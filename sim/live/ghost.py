@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import signal
 from collections.abc import MutableSequence, Sequence
 from multiprocessing.connection import Connection
@@ -73,6 +74,7 @@ def follow(connection: Connection, start: Start, shared: MutableSequence[float])
         connection.send(str(error))
         return
     connection.send("")
+    gc.disable()  # as in the process of the QP law
     loop = flight.loop
     assert isinstance(loop, LiveLoop)
     places = loop.recorder.places

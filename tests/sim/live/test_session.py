@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import json
 import math
 import multiprocessing
@@ -52,6 +53,18 @@ def test_a_flight_rewound_and_changed_alike_is_the_same_in_both_laws():
     session.change("task", {"push_n": 7.0})
     fly(session, 200)
     assert (session.file(), ghost.digest.hexdigest()) == first
+
+
+def test_ticks_and_snapshots_leave_no_cycles_of_references():
+    session = Session(START, ghost_flight(START))
+    fly(session, 300)
+    gc.collect()
+    gc.disable()
+    try:
+        fly(session, 500)  # of these, two with a snapshot
+        assert gc.collect() == 0  # the processes of live collect in a pause only
+    finally:
+        gc.enable()
 
 
 def test_a_fork_goes_another_way_and_its_file_repeats_it(tmp_path):
