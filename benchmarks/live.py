@@ -1,4 +1,6 @@
-"""Load of ``ibvs-qp live``: headless clients that read everything; frames per second of each, late ticks, cores used.
+"""Load of ``ibvs-qp live``: frames per second of headless clients that read everything, late ticks, cores used.
+
+With ``--chromium``, one page in Debian's Chromium that renders without a GPU: simulated over real time.
 
 Example: python benchmarks/live.py --clients 10
 """
@@ -8,6 +10,8 @@ from __future__ import annotations
 import argparse
 import asyncio
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +20,10 @@ import time
 import psutil
 import viser
 import websockets
+
+#: Chromium without a GPU, and the size of its page [px].
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+PAGE_PX = {"width": 1366, "height": 768}
 
 
 async def _read(port: int, seconds: float) -> float:
@@ -44,12 +52,36 @@ async def _all(port: int, clients: int, seconds: float) -> list[float]:
     return await asyncio.gather(*(_read(port, seconds) for _ in range(clients)))
 
 
+def _rate(port: int, seconds: float) -> float:
+    """Simulated over real time while Chromium shows the page."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as library:
+        browser = library.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        page = browser.new_page(viewport=PAGE_PX)  # type: ignore[arg-type]
+        page.goto(f"http://127.0.0.1:{port}")
+        page.wait_for_selector("canvas")
+
+        def flown_s() -> float:
+            page.wait_for_function("() => /\\d s x/.test(document.body.innerText)")
+            found = re.search(r"(\d+\.\d\d) s x", page.inner_text("body"))
+            assert found
+            return float(found[1])
+
+        first, began = flown_s(), time.monotonic()
+        time.sleep(seconds)
+        rate = (flown_s() - first) / (time.monotonic() - began)
+        browser.close()
+    return rate
+
+
 def main() -> None:
     """Fly, connect, read, and print."""
     parser = argparse.ArgumentParser(description="Load of ibvs-qp live")
     parser.add_argument("--clients", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--port", type=int, default=8765)
+    parser.add_argument("--chromium", action="store_true", help="one page in Chromium instead of the clients")
     given = parser.parse_args()
     command = [
         sys.executable,
@@ -70,7 +102,11 @@ def main() -> None:
         fly = next(each for each in children if "spawn_main" in " ".join(each.cmdline()))
         parts = {"flight": fly, "server": server, "clients": psutil.Process()}
         before, began = _used_s(parts), time.monotonic()
-        rates = asyncio.run(_all(given.port, given.clients, given.seconds))
+        rates = []
+        if given.chromium:
+            print(f"simulated over real time: {_rate(given.port, given.seconds):.2f}")
+        else:
+            rates = asyncio.run(_all(given.port, given.clients, given.seconds))
         took = time.monotonic() - began
         if rates:
             print(f"frames/s of {len(rates)} clients: {min(rates):.1f} to {max(rates):.1f}")

@@ -34,7 +34,6 @@ def test_a_setting_that_does_not_fly_is_refused():
         LiveFlight().start(Setting(seed=-1))
 
 
-
 def test_bars_are_as_long_as_their_values_and_red_at_the_limit():
     drawn = bars("thrust", [("a<b", 2.0, 1.0), ("c", 1.0, 4.0)], limit=4.0, full=4.0)
     widths = [float(each) for each in re.findall(r'<rect[^>]*width="([\d.]+)"', drawn)]
