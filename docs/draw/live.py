@@ -65,6 +65,7 @@ def live() -> Iterator[np.ndarray]:
 
 def _pictures(page: Page) -> Iterator[np.ndarray]:
     page.wait_for_selector("canvas")
+    page.locator(".mantine-Notification-closeButton").click()  # that of rendering in software
     _until(page, PRESSED_S)
     _press(page, "Pause")
     page.wait_for_function("() => document.body.innerText.includes('paused')")
