@@ -388,7 +388,7 @@ def _(at_the_limit, bench, comparison, controls, ticks):
         drawn, text = ticks.show(ticks.hold_s, "thrust_ceiling", 0.25)
         assert "holds for changes of" in text and drawn.count("<svg") == 2
         assert "No limit is active" in ticks.show(ticks.hold_s, "thrust_ceiling", 1.0)[1]
-        assert "No thrusts satisfy" in ticks.show(ticks.hold_s, "thrust_ceiling", 0.01)[1]
+        assert "Unallocated" in ticks.show(ticks.hold_s, "thrust_ceiling", 0.01)[1]
 
     def test_active_limits_have_a_multiplier():
         flown = at_the_limit.now

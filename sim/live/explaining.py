@@ -37,7 +37,7 @@ class WhatIf:
     Attributes:
         vehicle: The vehicle.
         rotors: Names of the rotors.
-        names: What `scaled` changes: the ceiling of thrusts, weights, and limits but their switches.
+        names: Values that `scaled` changes: the ceiling of thrusts, weights, and limits but their switches.
 
     Args:
         config: The controller flown; only its structure matters, weights and bounds are inputs of a tick.

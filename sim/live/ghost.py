@@ -22,7 +22,7 @@ SHARED = 1 + 3 + 4
 
 
 class Ghost:
-    """The analytic law as a session sees it: ticks and changes are sent, and its process flies them in this order.
+    """The analytic law beside a session: ticks and changes are sent, and its process executes them in this order.
 
     Args:
         connection: To its process.

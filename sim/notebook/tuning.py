@@ -119,7 +119,7 @@ class TuningBench:
         Args:
             values: Values of knobs.
             own_gains: The analytic law uses the gains of its own preset; otherwise those of the setting.
-            note: Called with what is being flown.
+            note: Called with the law being flown.
 
         Returns:
             The comparison; the one before, with a refusal, when the configuration is refused.

@@ -113,6 +113,8 @@ def test_the_page_draws_and_every_control_acts(live, tmp_path):
     wait_for("run", lambda: page.time_s > before + 0.5)
     page.enter("push = 0.5", -1.0)  # decades: the weight of the push row is 0.1
     wait_for("a changed weight", lambda: "weights.push 0.1" in page.text)
+    changed = page.time_s
+    wait_for("flight with it", lambda: page.time_s > changed + 0.5)  # more than the rewind below
 
     page.tab("Disturb")
     page.press("Rotor lost")
