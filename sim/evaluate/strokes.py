@@ -35,6 +35,7 @@ class Stroke:
     overlap_m: float  # least overlap with the band of the stroke before, without its end; < 0 is a gap
     most_overlap_m: float  # largest one
     nominal_overlap_m: float  # that of the scene
+    hole_m: float  # longest way along u without contact between two places with it
 
 
 def nominal_lines(board: BoardGeometry) -> np.ndarray:
@@ -67,9 +68,11 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
         straight = (np.abs(line[:, 0] - first) > CORNER_M) & (np.abs(line[:, 0] - last) > CORNER_M)
         error = line[straight if straight.any() else slice(None), 1] - place
         overlap = _overlap(inner, before, width, first > last) if before is not None else np.array([])
+        places = np.sort(np.concatenate((path[:, 0], second[:, 0])))
         strokes[number] = Stroke(
             number=number,
-            length_m=float(np.ptp(np.concatenate((path[:, 0], second[:, 0])))),
+            length_m=float(places[-1] - places[0]),
+            hole_m=float(np.diff(places).max(initial=0.0)),
             place_error_m=float(np.mean(error)),
             overlap_m=float(overlap.min()) if len(overlap) else math.nan,
             most_overlap_m=float(overlap.max()) if len(overlap) else math.nan,

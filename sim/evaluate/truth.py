@@ -69,7 +69,8 @@ class Assessment:
     def least_contact(self) -> float:
         """Contact that painting needs in the world flown."""
         scene = self.trace.scene
-        rough = scene.wind.gust_n_rms > 0.0 or world_name(scene.errors) == HARSH
+        gusts = scene.wind.gust_n_rms > 0.0 or max(scene.errors.air.gust_n) > 0.0
+        rough = gusts or world_name(scene.errors) == HARSH
         return ROUGH_CONTACT if rough else CONTACT
 
     def of_stroke(self, number: int) -> str | None:
@@ -140,6 +141,8 @@ class Assessment:
             )
         if abs(stroke.length_m - paint.stroke_m) > LENGTH_M:
             yield f"{stroke.length_m:.3f} m long, {paint.stroke_m:.3f} m asked"
+        if stroke.hole_m > paint.brush_width_m:
+            yield f"a hole: no contact over {_mm(stroke.hole_m)}, brush {_mm(paint.brush_width_m)} wide"
 
     def _retreat(self) -> Iterator[str]:
         trace = self.trace

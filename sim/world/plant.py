@@ -20,7 +20,7 @@ from sim.world.face import TIP_RADIUS_M, Face
 from sim.world.mjcf import STEP_NS, build_model
 from sim.world.mujoco_frames import FLIP, FLIP_QUATERNION
 from sim.world.readings import PlantReadings
-from sim.world.readout import PLACES, SIZE, drive, readout
+from sim.world.readout import CONTACT_NUMBERS, PLACES, SIZE, drive, readout
 from sim.world.rotor_errors import ThrustFactors
 from sim.world.scene import Scene
 from sim.world.touch import Touch
@@ -50,7 +50,8 @@ class Plant(PlantReadings):
         gain: True over commanded thrust of every rotor, (n,); may be changed in flight.
         outer_force: Force at the true centre of mass in addition to that of the air, NED [N], or None.
         truth: Present readings, see `sim.world.readout.PLACES`; a view, valid until the next tick, read-only.
-        pushes: Normal contact force at every physics step of the last tick [N], likewise.
+        pushes: Contact force into the wall at every physics step of the last tick [N], likewise: of a relief the whole
+            force along the wall's normal.
         tick_ns: The control tick [ns].
 
     Args:
@@ -141,11 +142,28 @@ class Plant(PlantReadings):
             mujoco.mj_kinematics(self.model, self.data)
             tip, ahead = self.data.geom_xpos[self._ids.tip], self.data.geom_xmat[self._ids.tip][::3]
             self.truth[_TIP] = FLIP * (tip + TIP_RADIUS_M * ahead)
+        if self._touch.rough:
+            self._read_rough_contact()
         if surface.flat:
             return
         chart = surface.chart(self.truth[_TIP])
         self.truth[_FRICTION] = self.truth[_FRICTION] @ surface.axes(chart)
         self.truth[_TIP] = chart
+
+    def _read_rough_contact(self) -> None:
+        """Push and friction of a relief: the whole contact force along the normal of the wall, and the rest of it.
+
+        The contact of a slope has another normal, and its friction a share in the push.
+        """
+        surface = self._board.surface
+        start, normal = self._ids.remembered[3], FLIP * surface.axes(surface.chart(self.truth[_TIP]))[:, 0]
+        samples = self.data.history[start : start + CONTACT_NUMBERS * self._steps].reshape(self._steps, -1)
+        found, forces, first, second = samples[:, :1], samples[:, 1:4], samples[:, 4:7], samples[:, 7:10]
+        axes = np.stack((first, second, np.cross(first, second)), axis=1)
+        on_board = np.where(found > 0.0, np.einsum("si,sij->sj", forces, axes), 0.0)
+        self.pushes[:] = on_board @ normal
+        self.truth[PLACES["push"]] = self.pushes[-1]
+        self.truth[_FRICTION] = FLIP * (self.pushes[-1] * normal - on_board[-1])
 
     def step(self, thrusts: np.ndarray) -> None:
         """Advance one control tick under constant commanded thrusts.

@@ -38,6 +38,8 @@ _STARTS = [sum(list(READINGS.values())[:index]) for index in range(len(READINGS)
 PLACES = {name: slice(*_STARTS[index : index + 2]) for index, name in enumerate(READINGS)}
 MOTION = slice(0, PLACES["rate"].stop)
 SIZE = _STARTS[-1]
+#: Numbers of the contact sensor: found, force (3), normal (3), first tangent (3).
+CONTACT_NUMBERS = 10
 #: A non-finite or overflowing sum exceeds this [-].
 _FINITE = 1e300
 
@@ -87,7 +89,7 @@ def readout(size: int, accelerometer: int, force: int, torque: int, contact: int
     felt = [sum(samples[1:], samples[0]) for samples in felts]
     fraction = 1.0 / steps
     fx, fy, fz, mx, my, mz = (*sensed(force, 3, -1), *sensed(torque, 3, -1))
-    touches = [sensed(contact, 10, step) for step in range(steps)]
+    touches = [sensed(contact, CONTACT_NUMBERS, step) for step in range(steps)]
     pushes = [ca.if_else(touch[0] > 0.0, touch[1], 0.0) for touch in touches]
     found, _, first, second, *axes = touches[-1]
     (tx, ty, tz), (sx, sy, sz) = axes[3:6], cross(axes[:3], axes[3:6])

@@ -24,6 +24,7 @@ class Touch:
 
     Attributes:
         needed: Whether a step needs that; a spring before a flat board does not.
+        rough: Whether the wall has a relief.
 
     Args:
         board: Wall and board, with the errors of the scene.
@@ -38,6 +39,7 @@ class Touch:
         errors, wall = scene.errors, scene.wall
         self._board, self._face, self._model, self._ids = board, face, model, ids
         self._relief = Relief(errors.relief, board, seed) if errors.relief != ReliefErrors() else None
+        self.rough = self._relief is not None
         self._bristles = None
         if errors.brush != BrushErrors():
             self._bristles = Bristles(errors.brush, wall.stiffness_n_m, wall.friction)
