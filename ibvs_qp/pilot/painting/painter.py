@@ -13,7 +13,7 @@ from typing import Any
 from ibvs_qp.pilot.painting.command import ExpectedEdge, PainterInput, PaintingCommand
 from ibvs_qp.pilot.painting.navigation import Navigation
 from ibvs_qp.pilot.painting.speed import approached, climb_speed, ramped, stroke_speed
-from ibvs_qp.pilot.painting.standstill import STOP_DISTANCE, Alignment, StrokeEnd
+from ibvs_qp.pilot.painting.standstill import STOP_DISTANCE, Alignment, HeldTip, StrokeEnd
 from ibvs_qp.pilot.painting.strategy import RETREAT_REACHED, Strategy
 from ibvs_qp.pilot.painting.stroke import Stroke
 
@@ -56,7 +56,7 @@ class Painter(Strategy):
         super().reset()
         self._tip = tip = Navigation(self.config)
         self._stroke = Stroke(self.config, tip.cross, tip.along, number=1, place=self.config.edge_margin_m)
-        self._alignment, self._stroke_end = Alignment(self.config), StrokeEnd(self.config)
+        self._alignment, self._stroke_end, self._held = Alignment(self.config), StrokeEnd(self.config), HeldTip()
         self._last_time = self._standoff = math.nan
         self._way_s = 0.0  # time of the way in this phase, added to the time-out [s]
         self._since = math.inf  # time of the touch in press, and of the arrival in climb and search [s]
@@ -91,7 +91,7 @@ class Painter(Strategy):
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         config, stroke, tip = self.config, self._stroke, self._tip
         self.enter(inputs, phase, reason)
-        self._since = math.inf
+        self._since, self._held = math.inf, HeldTip()
         if phase != "retouch":
             stroke.back_to = math.nan
         u, v = stroke.way
@@ -270,13 +270,14 @@ class Painter(Strategy):
         remaining = stroke.direction * (goal - tip.along.u)
         tip.slide_to(v, dt)
         self._pause_without_contact(inputs)
-        stroke.count(inputs, remaining, dt, first_pass=self.phase == "paint")
+        stroke.count(inputs, dt)
         if inputs.in_contact and tip.mark is not None:
             stroke.measure()  # an overshoot, by the edge
-        target = 0.0 if self._paused else stroke_speed(config, remaining)
+        target = 0.0 if self._paused or self._held.rests else stroke_speed(config, remaining)
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         if remaining <= STOP_DISTANCE:
             self._speed = 0.0
+        self._held.update(config, self._speed, stroke.direction * tip.along.step, dt)
         self._lead_to_end(remaining, dt)
         return self._stroke_end.is_reached(inputs, remaining) and not self._paused
 
@@ -363,7 +364,9 @@ class Painter(Strategy):
     def _on_the_wall(self, **targets: Any) -> PaintingCommand:
         """Command with contact, as of `Navigation.command`."""
         travel = self.config.speed_m_s * self._stroke.direction if self._SLIDES else 0.0
-        return self._tip.command(contact=True, travel=travel, **targets)
+        command = self._tip.command(contact=True, travel=travel, **targets)
+        command.push *= self._held.share
+        return command
 
     def _begin_search(self, inputs: PainterInput, why: str) -> None:
         config, stroke = self.config, self._stroke

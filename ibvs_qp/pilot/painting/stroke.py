@@ -29,6 +29,8 @@ UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 ASIDE_M = 0.002
 #: Most of the time of painting without contact [-], below this push [N].
 MOST_LOST, LOST_N = 0.02, 0.3
+#: Length of the pieces of a stroke that have felt the brush or not [m].
+PIECE_M = 0.005
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
 #: Standard deviations at which a stroke is at its place, leaves no gap, and overlaps no more than allowed [-].
@@ -65,12 +67,11 @@ class Stroke:
     back_to: float = math.nan  # u to which the tip goes back for a retouch [m], NaN otherwise
     longest: float = 0.0  # length with each pass and overshoot [m]
     behind: float = 0.0  # paint before its beginning, by a gust or a retouch [m]
-    lost_m: float = 0.0  # way without contact [m]
-    lost_at_ends_m: float = 0.0  # and of it near both ends [m]
 
     def __post_init__(self) -> None:
         """Derive."""
         self.travel = Pattern.travel(self.number)
+        self._felt = np.zeros(round(self.config.stroke_m / PIECE_M), bool)  # pieces that the brush has touched
 
     def following(self) -> Stroke:
         """The stroke after this one, whose place is kept until the step to the next one begins."""
@@ -181,19 +182,34 @@ class Stroke:
         middle, half = self.along.u + REACTION_M * self.direction, 0.25 * self.config.brush_width_m
         return middle - half, middle + half
 
-    def count(self, inputs: PainterInput, remaining: float, dt: float, first_pass: bool) -> None:
-        """Count the time of painting, and time and way without contact; a retouch has paint below it."""
+    def count(self, inputs: PainterInput, dt: float) -> None:
+        """Count the time of painting, and of it without contact, and mark the piece under the brush."""
         self.painted_s += dt
         if inputs.in_contact:
             self.behind = max(self.behind, -self.travel * self.along.moved)
         if inputs.push > LOST_N:
-            return
-        self.lost_s += dt
-        if first_pass:
-            advance, half = self.direction * self.along.step, 0.5 * self.config.brush_width_m
-            self.lost_m = max(self.lost_m + advance, 0.0)
-            if not half < remaining < self.config.stroke_m - half:
-                self.lost_at_ends_m = max(self.lost_at_ends_m + advance, 0.0)
+            self._felt[self._piece(self.along.u)] = True
+        else:
+            self.lost_s += dt
+
+    def _hole(self) -> tuple[float, float]:
+        """First and last u of the longest way without contact that leaves a hole [m]; both NaN without one.
+
+        The brush covers half its width from both sides; beyond an end there is no other side.
+        """
+        first, last = sorted((self._piece(self.along.began), self._piece(self.along.u)))
+        felt, half = self._felt[first : last + 1], round(0.5 * self.config.brush_width_m / PIECE_M)
+        holes = np.flatnonzero(np.diff(felt.astype(int), prepend=1, append=1)).reshape(-1, 2)
+        size = np.diff(holes)[:, 0]
+        inner = (holes[:, 0] > half) & (holes[:, 1] < len(felt) - half)
+        size[size <= np.where(inner, half, round(LENGTH_TOLERANCE_M / PIECE_M))] = 0
+        if not size.any():
+            return math.nan, math.nan
+        begin, end = (first + holes[np.argmax(size)]) * PIECE_M
+        return float(begin), float(end)
+
+    def _piece(self, u: float) -> int:
+        return int(clipped(u / PIECE_M, 0.0, len(self._felt) - 1.0))
 
     def measure(self) -> None:
         """Measure the paint past the end of the stroke, to which gusts push the tip."""
@@ -205,13 +221,16 @@ class Stroke:
         least = overlap - RETOUCH_SIGMAS * np.hypot(known, self.cross.misfit)
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self.certain_m)]
+        hole = self._hole()
+        gaps = np.concatenate((gaps, np.array(hole)[np.isfinite(hole)]))
         if not gaps.size or self.retouches >= MOST_RETOUCHES or self.cross.longest_unled > MOST_UNLED_M:
             return ""
         first = float(gaps.min() if self.travel > 0.0 else gaps.max())
         before = max(self.travel * (first - self.begin) - RETOUCH_BEFORE_M, TURN_BEFORE_M)
         self.retouches, self.back_to = self.retouches + 1, self.begin + self.travel * before
-        short, way = -float(least.min()), abs(self.along.u - self.back_to)
-        return f"row {self.number} may leave a gap of {short * 1e3:.1f} mm, back by {way:.2f} m"
+        short, way = -float(least.min(initial=0.0)), abs(self.along.u - self.back_to)
+        flaw = f"may leave a gap of {short * 1e3:.1f} mm" if short > 0.0 else f"was {_without_contact(hole)}"
+        return f"row {self.number} {flaw}, back by {way:.2f} m"
 
     def doubt(self, by_edge: bool) -> str:
         """Why the stroke that has ended, with the edge there in view or not, is not claimed; empty where it is."""
@@ -227,9 +246,8 @@ class Stroke:
             return f"row {row} is painted over {painted * 1e3:.0f} mm, {asked * 1e3:.0f} mm were asked"
         if along.slip > config.gates.stop_m:
             return f"row {row} met an edge {along.slip * 1e3:.0f} mm from where the odometer expected it"
-        # The brush covers half its width from both sides; beyond an end there is no other side.
-        if self.lost_m > 0.5 * config.brush_width_m or self.lost_at_ends_m > LENGTH_TOLERANCE_M:
-            return f"row {row} was without contact over {self.lost_m * 1e3:.0f} mm"
+        if not math.isnan((hole := self._hole())[0]):
+            return f"row {row} was {_without_contact(hole)}"
         if self.is_last and self.lost_s > MOST_LOST * self.painted_s:
             return f"the strokes were without contact for {self.lost_s:.1f} s of {self.painted_s:.1f} s"
         _, overlap, known, largest = self._overlap()
@@ -251,3 +269,8 @@ class Stroke:
     def _overlap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Overlap of the stroke that has ended with the last one, as of `CrossTrack.overlap`."""
         return self.cross.overlap(self.begin, self.goal - CORNER_M * self.travel)
+
+
+def _without_contact(hole: tuple[float, float]) -> str:
+    """A hole in words, by its first and last u [m]."""
+    return f"without contact over {1e3 * (hole[1] - hole[0]):.0f} mm"

@@ -195,6 +195,7 @@ def test_what_is_painted_beside_the_board_is_no_stroke():
     (0.09, Scene(wind=WindScene(gust_n_rms=1.0)), True), (0.11, Scene(wind=WindScene(gust_n_rms=1.0)), False),
     (0.09, in_world(Scene(), "harsh"), True), (0.11, in_world(Scene(), "harsh"), False),
     (0.09, in_world(Scene(), "datasheet"), False),
+    (0.04, in_world(Scene(), "field"), True), (0.11, in_world(Scene(), "field"), False),
 ])  # fmt: skip
 def test_contact_lasts(share, scene, good):
     trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)), scene)
@@ -202,6 +203,17 @@ def test_contact_lasts(share, scene, good):
     trace.arrays["contact_1khz"][painting[4000 : 4000 + round(share * len(painting))]] = 0.0
     found = shortfall(trace)
     assert (found is None) if good else found.startswith("contact in ")
+
+
+@pytest.mark.parametrize(("hole_m", "good"), [(0.075, True), (0.085, False)])
+def test_a_brush_covers_a_hole_of_its_width(hole_m, good):
+    trace = synthetic_trace(Errors(row_offset_m=(0.0, 0.0)))
+    painted = along(trace)[trace.row == 2]
+    middle = 0.5 * (painted.min() + painted.max())
+    lifted = (trace.row == 2) & (np.abs(along(trace) - middle) < 0.5 * hole_m)
+    trace.arrays["push_true"] = np.where(lifted, 0.0, trace.push_true)
+    found = shortfall(trace)
+    assert (found is None) if good else found.startswith(f"row 2: a hole: no contact over {1e3 * hole_m:.0f} mm")
 
 
 def test_the_vehicle_backs_away():

@@ -15,7 +15,9 @@ from sim.world.board import BoardGeometry
 from sim.world.bristles import Bristles
 from sim.world.contact import contact_stiffness
 from sim.world.errors import AirErrors, ArmErrors, BrushErrors, WorldErrors, world_errors
+from sim.world.mujoco_frames import FLIP
 from sim.world.plant import Plant
+from sim.world.readout import PLACES
 from sim.world.relief import Relief
 from sim.world.scene import Scene, StartScene, WindScene
 from sim.world.wall_air import WallAir
@@ -178,3 +180,32 @@ def test_bristles_before_the_wall_beside_the_board_touch_nothing() -> None:
         stiffness, tool = contact_stiffness(plant.model), plant.data.xfrc_applied[plant._ids.tool]
         assert (np.abs(tool).max() > 0.5) == touches
         assert touches == (stiffness > 1500.0 * 1.1) and stiffness < 1500.0 * 1.7
+
+
+def contact_force(plant: Plant) -> np.ndarray:
+    """Whole contact force on the board in the world, NED [N], (3,), from MuJoCo's list of contacts."""
+    force = np.zeros(3)
+    for index, contact in enumerate(plant.data.contact):
+        local = np.zeros(6)
+        mujoco.mj_contactForce(plant.model, plant.data, index, local)
+        force -= FLIP * (contact.frame.reshape(3, 3).T @ local[:3])
+    return force
+
+
+@pytest.mark.parametrize("kind", [{}, {"lean_deg": 10.0}, {"kind": "cylinder", "radius_m": 1.5}])
+def test_the_push_on_a_flank_is_the_whole_force_along_the_normal_of_the_wall(kind: dict[str, float | str]) -> None:
+    """The normal force of the contact alone is another one there, since friction acts along the flank."""
+    errors = WorldErrors(relief=dataclasses.replace(FIELD.relief, rivets_per_m2=200.0, seams_per_m=5.0, step_m=0.0))
+    scene = Scene(errors=errors, surface=dataclasses.replace(Scene().surface, **kind))
+    plant, relief, others = Plant(scene, seed=1), Relief(errors.relief, BoardGeometry(scene), 1), 0
+    hover, start = plant.thrusts_actual.copy(), plant.position.copy()
+    for along in np.arange(0.3, 0.7, 0.02):
+        tip = BoardGeometry(scene).surface.points(np.array([0.002, *BoardGeometry(scene).point(along, 0.3)]))
+        at_rest(plant, start)
+        plant.displace(tip - BoardGeometry(scene).surface.points(plant.tip))
+        plant.step(hover)
+        force, normal = contact_force(plant), plant.normal
+        assert plant.truth.item(PLACES["push"].start) == pytest.approx(force @ normal, abs=1e-6)
+        assert plant.pushes[-1] == plant.truth.item(PLACES["push"].start)
+        others += bool(np.hypot(*relief.height(along, 0.3)[1:]) > 0.1) and force @ normal > 0.0
+    assert others >= 2

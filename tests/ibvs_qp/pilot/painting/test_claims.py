@@ -35,6 +35,19 @@ def bare(gap_m: float, from_u: float = 0.7, rows: int = 4) -> PaintedWall:
     return world
 
 
+def hollow(first_u: float, last_u: float) -> PaintedWall:
+    """In every pass over a part of stroke 2 the push is too small for contact."""
+    world = flown("paint", 2, rows=2, stroke_m=1.0)
+    plain = world.step
+
+    def step() -> None:
+        world.push = 0.0 if first_u < world.tip[0] < last_u else 5.0
+        plain()
+
+    world.step = step
+    return world
+
+
 def slipped() -> PaintedWall:
     """The odometer slips by 50 mm before the contact is lost; that way is the tip's, not that of its estimate."""
     world = flown("paint", 2, 3.0, rows=6, stroke_m=1.0)
@@ -83,10 +96,11 @@ JOBS: dict[str, tuple[Job, str]] = {
     "decoy 15 cm before the end": (lambda: decoy(0.1), MET),
     "decoy 23 cm before the end": (lambda: decoy(0.18), MET),
     "bare for less than half a brush": (lambda: bare(0.02), ""),
-    "bare for more": (lambda: bare(0.05), BARE),
-    "bare at the beginning": (lambda: bare(0.02, 1.1), BARE),  # beyond it there is no paint of another side
-    "bare at the end": (lambda: bare(0.02, 0.025), BARE),
-    "bare after a slip of the odometer": (slipped, r"row 2 .*"),
+    "bare for more, in the first pass": (lambda: bare(0.05), ""),
+    "bare for more, in every pass": (lambda: hollow(0.5, 0.56), BARE),
+    "bare at the beginning, which no pass reaches": (lambda: bare(0.02, 1.1), BARE),
+    "bare at the end, in the first pass": (lambda: bare(0.02, 0.025), ""),
+    "bare after a slip of the odometer, in the first pass": (slipped, ""),
     "beside its place": (
         lambda: wall(rows=1, wave=lambda _stroke, _u: 0.012, stuck_across=True),
         r"row 1 lies \+12 mm from its place, known to 0\.\d mm, limit 8 mm",
@@ -115,6 +129,8 @@ def test_a_job_is_claimed_without_a_flaw_and_refused_with_its_name(name: str) ->
     world = job()
     found = world.finish()
     assert re.fullmatch(reason, found), found
+    if "bare" in name:
+        assert ("retouch" in world.phases()) is ("pass" in name)
     if name == "end hidden":
         assert world.reached[1] < world.config.stroke_m + 3e-3
     if name.startswith("edge lost"):

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from painted_wall import END, END_PART, FAR, GUIDE, NEAR, PLACE, PaintedWall, short, wall
+from painted_wall import END, END_PART, FAR, GUIDE, NEAR, PLACE, TICK, PaintedWall, short, wall
 
 from ibvs_qp.pilot.painting.pattern import CORNERS, PATTERNS, stroke_count
 from ibvs_qp.pilot.painting.stroke import LEAST_OVERLAP
@@ -231,3 +231,30 @@ def test_the_guide_of_stroke_one_is_the_edge_at_which_the_pattern_starts() -> No
         world.fly(60.0, until="paint")
         world.step()
         assert world.guide == GUIDE
+
+
+def test_a_tip_that_an_obstacle_holds_rests_and_passes_with_less_push() -> None:
+    """A rivet at u = 0.5 holds the tip under more than half of the push, and lets a resting one pass below it."""
+    world = wall(rows=1, stroke_m=1.0)
+    world.fly(90.0, until="paint")
+    push, speed = world.config.push_n, world.config.speed_m_s
+    pushes, speeds, held_s = [], [], 0.0
+    while world.painter.phase == "paint":
+        command = world.step()
+        world.stuck = 0.5 < world.tip[0] < 0.51 and command.push > 0.5 * push
+        held_s += TICK * world.stuck
+        pushes.append(command.push)
+        speeds.append(float(np.hypot(*command.velocity)))
+    assert held_s < 2.0, "it would time out"
+    least = int(np.argmin(pushes))
+    assert 0.3 * push < pushes[least] < 0.4 * push
+    assert min(speeds[least : least + 200]) == 0.0, "at rest before it goes on"
+    assert pushes[0] == pushes[-1] == push and max(speeds) == pytest.approx(speed)
+    assert world.finish() == ""
+
+
+def test_a_tip_that_slides_keeps_its_push() -> None:
+    world = wall(rows=1, stroke_m=1.0)
+    world.fly(90.0, until="paint")
+    while world.painter.phase == "paint":
+        assert world.step().push == world.config.push_n
