@@ -365,7 +365,7 @@ class Painter(Strategy):
         """Command with contact, as of `Navigation.command`."""
         travel = self.config.speed_m_s * self._stroke.direction if self._SLIDES else 0.0
         command = self._tip.command(contact=True, travel=travel, **targets)
-        command.push *= self._held.share
+        command.push *= self._held.push
         return command
 
     def _begin_search(self, inputs: PainterInput, why: str) -> None:

@@ -14,9 +14,9 @@ STOP_DISTANCE, STOP_SPEED_RATIO = 0.002, 2.0
 #: friction alone holds a tip at the beginning of a stroke for 0.3 s; slowest command that counts, over the speed of the
 #: job [-].
 HELD_AVERAGE_S, HELD_RATIO, HELD_PATIENCE_S, LEAST_COMMAND = 0.1, 0.2, 0.25, 0.5
-#: Share of the push against an obstacle [-], its rate [1/s], the rest before the tip goes on [s], until drive and push
+#: Push against an obstacle over that of the job [-], its rate [1/s], the rest before the tip goes on [s], until drive and push
 #: have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
-EASED_SHARE, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 2.0, 0.8, 0.05
+EASED_PUSH, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 2.0, 0.8, 0.05
 
 
 class StrokeEnd:
@@ -88,12 +88,12 @@ class HeldTip:
     alone frees no tip, and one that frees itself under full drive is thrown along the wall.
 
     Attributes:
-        share: Of the push [-].
+        push: Over the push of the job [-].
         rests: Whether the tip waits for drive and push to fall.
     """
 
     def __init__(self) -> None:
-        self.share, self.rests = 1.0, False
+        self.push, self.rests = 1.0, False
         self._speed = self._held_s = self._eased_s = 0.0
         self._way = math.inf  # since the tip was held [m]
 
@@ -109,4 +109,4 @@ class HeldTip:
             self._eased_s = self._way = 0.0
         eased = self._way < EASED_WAY_M
         self.rests = eased and self._eased_s < EASED_REST_S
-        self.share = clipped(self.share + (-EASE_1_S if eased else EASE_1_S) * dt, EASED_SHARE, 1.0)
+        self.push = clipped(self.push + (-EASE_1_S if eased else EASE_1_S) * dt, EASED_PUSH, 1.0)

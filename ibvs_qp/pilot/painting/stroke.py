@@ -208,6 +208,9 @@ class Stroke:
         begin, end = (first + holes[np.argmax(size)]) * PIECE_M
         return float(begin), float(end)
 
+    def _without_contact(self, hole: tuple[float, float]) -> str:
+        return f"row {self.number} was without contact over {1e3 * (hole[1] - hole[0]):.0f} mm"
+
     def _piece(self, u: float) -> int:
         return int(clipped(u / PIECE_M, 0.0, len(self._felt) - 1.0))
 
@@ -229,8 +232,8 @@ class Stroke:
         before = max(self.travel * (first - self.begin) - RETOUCH_BEFORE_M, TURN_BEFORE_M)
         self.retouches, self.back_to = self.retouches + 1, self.begin + self.travel * before
         short, way = -float(least.min(initial=0.0)), abs(self.along.u - self.back_to)
-        flaw = f"may leave a gap of {short * 1e3:.1f} mm" if short > 0.0 else f"was {_without_contact(hole)}"
-        return f"row {self.number} {flaw}, back by {way:.2f} m"
+        gap = f"row {self.number} may leave a gap of {short * 1e3:.1f} mm"
+        return f"{gap if short > 0.0 else self._without_contact(hole)}, back by {way:.2f} m"
 
     def doubt(self, by_edge: bool) -> str:
         """Why the stroke that has ended, with the edge there in view or not, is not claimed; empty where it is."""
@@ -247,7 +250,7 @@ class Stroke:
         if along.slip > config.gates.stop_m:
             return f"row {row} met an edge {along.slip * 1e3:.0f} mm from where the odometer expected it"
         if not math.isnan((hole := self._hole())[0]):
-            return f"row {row} was {_without_contact(hole)}"
+            return self._without_contact(hole)
         if self.is_last and self.lost_s > MOST_LOST * self.painted_s:
             return f"the strokes were without contact for {self.lost_s:.1f} s of {self.painted_s:.1f} s"
         _, overlap, known, largest = self._overlap()
@@ -269,8 +272,3 @@ class Stroke:
     def _overlap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Overlap of the stroke that has ended with the last one, as of `CrossTrack.overlap`."""
         return self.cross.overlap(self.begin, self.goal - CORNER_M * self.travel)
-
-
-def _without_contact(hole: tuple[float, float]) -> str:
-    """A hole in words, by its first and last u [m]."""
-    return f"without contact over {1e3 * (hole[1] - hole[0]):.0f} mm"
