@@ -14,8 +14,8 @@ STOP_DISTANCE, STOP_SPEED_RATIO = 0.002, 2.0
 #: friction alone holds a tip at the beginning of a stroke for 0.3 s; slowest command that counts, over the speed of the
 #: job [-].
 HELD_AVERAGE_S, HELD_RATIO, HELD_PATIENCE_S, LEAST_COMMAND = 0.1, 0.2, 0.25, 0.5
-#: Push against an obstacle over that of the job [-], its rate [1/s], the rest before the tip goes on [s], until drive and push
-#: have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
+#: Push against an obstacle over that of the job [-], its rate [1/s], the rest before the tip goes on [s], until drive
+#: and push have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
 EASED_PUSH, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 2.0, 0.8, 0.05
 
 
