@@ -71,8 +71,7 @@ class Compare:
         from rich.console import Console
 
         from sim.flight.working import working
-        from sim.report.comparison import compare, read_run
-        from sim.report.conditions import differing_presets, differing_runs, run_world
+        from sim.report.comparison import compare, differing_presets, differing_runs, read_run, run_world
         from sim.report.rundir import as_json
 
         folder, stopped, presets = None, False, self._presets()
@@ -163,8 +162,7 @@ def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Pat
     from sim.evaluate.flight_table import LINES
     from sim.evaluate.table import plain, terminal_table
     from sim.flight.trace import law_name
-    from sim.report.comparison import PAINT_VARIANT
-    from sim.report.conditions import ABSENT
+    from sim.report.comparison import ABSENT, PAINT_VARIANT
     from sim.sweep.statistics import needed, spread
 
     console, names = Console(), ("A", "B")

@@ -72,7 +72,7 @@ class Faults:
         from rich.console import Console
 
         from sim.fault_matrix.design import NAME, Choice, design, job_scene, pilot_of
-        from sim.fault_matrix.record import PARTS, summary, write
+        from sim.fault_matrix.page import PARTS, summary, write
         from sim.fault_matrix.verdict import verdicts
         from sim.flight.working import working
         from sim.report.rundir import RunFolder, as_json

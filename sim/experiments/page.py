@@ -17,9 +17,8 @@ from sim.experiments.variants import VARIANTS
 from sim.experiments.verdict import Verdict, verdicts
 from sim.experiments.wording import cell, entry, headings, interval, measured, value_of
 from sim.flight.trace import law_name
-from sim.sweep.mixed import Ratio, law_and_gains
 from sim.sweep.paired import exact_interval
-from sim.sweep.statistics import cells, false_claims, needed, parameters, select, split
+from sim.sweep.statistics import Ratio, cells, false_claims, law_and_gains, needed, parameters, select, split
 
 TEMPLATE = Path(__file__).with_name("page.md.jinja")
 #: The QP as shipped.

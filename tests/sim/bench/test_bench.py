@@ -13,9 +13,8 @@ import pytest
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import checks
-from sim.bench.mission import mission_shots
 from sim.bench.timing import DEADLINES_HZ, Row
-from sim.bench.vision import bench_vision
+from sim.bench.vision import bench_vision, mission_shots
 from sim.commands.cli import main
 from sim.world.scene import Scene
 

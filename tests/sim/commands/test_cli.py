@@ -356,7 +356,7 @@ def test_paint_on_geometric_features_end_to_end(tmp_path):
 
 def test_with_json_c_libraries_do_not_write_to_standard_output():
     code = (
-        "import os\nfrom sim.commands.streams import own_output\n"
+        "import os\nfrom sim.commands.cli import own_output\n"
         "with own_output():\n    os.write(1, b'Solver interrupted\\n')\n    print('{}')\nprint('after')\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)

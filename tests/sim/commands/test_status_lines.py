@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
-import sim.commands.status_lines as status_lines
-from sim.commands.status_lines import StatusLines
+import sim.commands.bridge as status_lines
+from sim.commands.bridge import StatusLines
 
 
 @pytest.fixture

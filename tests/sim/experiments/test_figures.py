@@ -7,10 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 from synthetic_trace import synthetic_trace
 
+from sim.experiments import figures as drawing
 from sim.experiments.design import Choice, designs
-from sim.experiments.figures import Results, draw, flights
-from sim.experiments.figures.common import CRASH
-from sim.experiments.figures.medians import plot_medians
+from sim.experiments.figures import CRASH, Results, draw, plot_medians
 from sim.experiments.spec import experiment
 from sim.sweep.parts import PARAM
 
@@ -40,7 +39,7 @@ def test_stored_flights_have_the_figures_of_a_run_folder(monkeypatch, tmp_path, 
     table = table_of("force-hold", force_std_n=0.1, contact_share=1.0)
 
     made = synthetic_trace()
-    monkeypatch.setattr(flights, "stored_trace", lambda _, rows: made if rows["variant"].first() == logged else None)
+    monkeypatch.setattr(drawing, "stored_trace", lambda _, rows: made if rows["variant"].first() == logged else None)
     figures = draw(Results(experiment("force-hold"), table, tmp_path))
     name = "force-hold" if logged == "standard" else "force-hold-direct"
     maps = {f"force-hold-{variant}-map-force_std_n" for variant in ("standard", "direct")}

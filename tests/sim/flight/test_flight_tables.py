@@ -6,7 +6,7 @@ import numpy as np
 
 from ibvs_qp.config.vehicle import VehicleParams
 from sim.flight import columns
-from sim.flight.flight_truth import euler_angles, in_body, rotations
+from sim.flight.assemble import euler_angles, in_body, rotations
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.plant import Plant

@@ -10,7 +10,7 @@ import pytest
 import ibvs_qp
 from ibvs_qp.pilot.presets import FILES
 from sim.commands.cli import main
-from sim.report.conditions import differing_presets, differing_runs
+from sim.report.comparison import differing_presets, differing_runs
 
 
 @pytest.fixture
