@@ -10,8 +10,7 @@ with app.setup:
     import numpy as np
 
     from allocation import TAROT_T960
-    from sim.notebook.picture import picture
-    from sim.notebook.table import number, table
+    from sim.notebook.common import number, picture, table
     from sim.notebook.vehicle import Duties, abilities, after_loss, cheapest, design_map, vehicle_case
     from sim.notebook.vehicle_figures import (
         draw_cuts,

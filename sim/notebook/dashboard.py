@@ -15,7 +15,7 @@ from sim.evaluate.path_error import CONTACT_N
 from sim.evaluate.window import tilt_deg
 from sim.figures.style import REFERENCE, note_empty
 from sim.flight.trace import Trace
-from sim.notebook.plots import BLUE, ORANGE, RED
+from sim.notebook.common import BLUE, ORANGE, RED
 from sim.notebook.tuning import Comparison, reach_note
 from sim.notebook.vehicle import Case
 from sim.notebook.wall_flights import HOVER_S

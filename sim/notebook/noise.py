@@ -16,7 +16,7 @@ from sim.experiments.design import Choice, design
 from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace, law_name
-from sim.notebook.table import table
+from sim.notebook.common import table
 from sim.sweep.design import Run
 from sim.sweep.figures.page import read_table
 from sim.sweep.fingerprint import code_hash, configuration_hash

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from sim.figures.style import FAINT, REFERENCE, legend_below, new_figure
-from sim.notebook.plots import BLUE, GREEN, ORANGE
+from sim.notebook.common import BLUE, GREEN, ORANGE
 from sim.notebook.vehicle import DOWN, FRONT, RIGHT, YAW, Case, Duties, cheapest
 
 #: Length of the arrow of a rotor's sideways force, per unit of sin(tilt) [m].

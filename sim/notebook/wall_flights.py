@@ -22,9 +22,8 @@ from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import Trace
+from sim.notebook.common import number, table, unless_short
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
-from sim.notebook.short import unless_short
-from sim.notebook.table import number, table
 from sim.sweep.setup import Setup
 from sim.world.scene import Scene
 

@@ -66,7 +66,7 @@ def loaded(code: str) -> set[str]:
 @pytest.mark.parametrize("config", ["from ibvs_qp import preset; config = preset().controller", "config = None"])
 def test_the_laws_and_assured_fly_in_a_light_installation(config: str) -> None:
     modules = loaded(LOAD_AND_FLY.replace("CONFIG", config).replace("TICKS", "50"))
-    assert {"osqp", "scipy.sparse", "ibvs_qp.supervision.supervisor"} <= modules
+    assert {"osqp", "scipy.sparse", "ibvs_qp.supervision.supervision"} <= modules
 
 
 def test_a_tick_of_the_laws_loads_no_heavy_part_of_scipy() -> None:
