@@ -148,7 +148,7 @@ def tables() -> dict[str, bytes]:
 def test_parquet(
     refuses: Callable[..., str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # none of these ends the process; that is tested in tests/sim/storage/test_parquet.py
+    # none of these ends the process; that is tested in tests/sim/storage/test_storage.py
     monkeypatch.setattr(sim.sweep.tables, "refuse_what_aborts", lambda files: None)
     table = pl.read_parquet(FOLDER.parents[2] / "docs" / "experiments" / "fair.parquet").head(40)
     table.write_parquet(stream := io.BytesIO())

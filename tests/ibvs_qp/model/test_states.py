@@ -20,8 +20,10 @@ friction               rises while a tip that shall travel is held, given up or 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from controller_scenes import line_references
@@ -31,6 +33,8 @@ from ibvs_qp.analytic import PaperController
 from ibvs_qp.config import ControllerConfig
 from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import Reference
+from ibvs_qp.symbolic.function import StepFunction
+from ibvs_qp.symbolic.signals import Signals
 
 LAWS = [HybridController, PaperController]
 #: The states above that a demand could wind up.
@@ -177,3 +181,20 @@ def test_an_integral_that_alone_keeps_the_thrusts_limited_falls(monkeypatch: pyt
         patched.setattr(step, "advance", wind_up)
         assert loop.fly(10, press)[-1, 3] > 0.5  # the row's filter lets it through within some ticks
     assert abs(loop.fly(2 * SATURATED, press)[-50:, 0].mean() - 28.0) < 0.3
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
+def test_states_stay_where_one_of_them_would_not_be_finite(odd: float) -> None:
+    signals = Signals()
+    total, count = signals.state("total"), signals.state("count")
+    signals.remember("total", total + signals.input("more"))
+    signals.remember("count", count + 1.0)
+    signals.output("shown", ca.sin(total))
+    step = StepFunction(signals)
+    for more in (2.0, odd, 3.0):
+        step.inputs["more"][0] = more
+        step.evaluate()
+        step.advance()
+    assert step.states["total"].item() == 5.0 and step.states["count"].item() == 2.0
+    step.reset()
+    assert step.states["total"].item() == step.states["count"].item() == 0.0

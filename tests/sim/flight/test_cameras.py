@@ -1,4 +1,4 @@
-"""The camera's mount of the true vehicle, and the press job."""
+"""Cameras in flight: mount of the true vehicle, place beside the arm, motion and lost pictures; the press job."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ import dataclasses
 
 import numpy as np
 import pytest
+from defect_scenes import with_errors
 
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.measurement import RgbdFrame
+from ibvs_qp.pilot import PilotConfig
+from sim.evaluate.metrics import compute_metrics
 from sim.experiments.scenes import near_wall
 from sim.flight.closed_loop import fly
 from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.sensors.camera_mount import CameraMount
+from sim.vehicles.configuration import with_vehicle
 from sim.world.plant_scene import PlantScene
 from sim.world.scene import Scene
 from sim.world.true_vehicle import true_vehicle
@@ -88,3 +92,52 @@ def test_a_camera_pitched_by_12_degrees_and_a_force_sensor_on_its_side_hold_the_
     held = (trace.phase == trace.phases.index("press")) & (trace.contact_weight == 1.0)
     late = trace.push_true[held][-500:]
     assert np.sqrt(np.mean((late - 5.0) ** 2)) < 0.3
+
+
+#: Ticks of a fall without thrust; three pictures are captured, two of them in motion.
+TICKS = 34
+
+
+def seen(scene: Scene, features: str) -> list[np.ndarray]:
+    """Pictures, or normals of the lines, of a fall."""
+    options = FlightOptions(seed=1, features=features, image_size=(424, 240))
+    world = World(scene, options, pilot_config(scene, options))
+    found = []
+    for _ in range(TICKS):
+        frame = world.sense()
+        if frame.image is not None:
+            found.append(frame.image.rgb)
+        elif frame.features is not None:
+            found.append(np.array([(line.rho, line.theta) for line in frame.features.lines]))
+        world.act(np.zeros(6))
+    return found
+
+
+@pytest.mark.parametrize("features", ["rendered", "geometric"])
+def test_motion_reaches_the_rolling_shutter(features: str) -> None:
+    ideal = seen(Scene(), features)
+    skewed = seen(with_errors(Scene(), camera={"rolling_shutter_s": 0.05}), features)
+    assert len(ideal) == len(skewed) >= 2
+    assert not np.array_equal(ideal[-1], skewed[-1])
+
+
+@pytest.mark.parametrize("features", ["rendered", "geometric"])
+def test_lost_pictures_stay_away(features: str) -> None:
+    assert len(seen(with_errors(Scene(), camera={"dropped": 0.9}), features)) < len(seen(Scene(), features))
+
+
+#: The camera is so far to the right of the arm [m]; the error of a start mark that ignores it is as large.
+BESIDE_M = 0.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["qp", "paper"])
+def test_a_row_begins_at_its_place(law: str) -> None:
+    config = PilotConfig(law=law)
+    vehicle = dataclasses.replace(config.controller.vehicle, camera_position_m=(0.20, BESIDE_M, 0.08))
+    scene = near_wall(board={"width_m": 0.5}, paint={"rows": 1, "stroke_m": 0.4})
+    trace = fly(scene, FlightOptions(law=law, features="geometric", video=False), config=with_vehicle(config, vehicle))
+    assert compute_metrics(trace)["completed"], trace.reason
+    painting = np.flatnonzero(trace.phase == trace.phases.index("paint"))
+    right_end = scene.board.width_m - scene.paint.edge_margin_m
+    assert abs(trace.tip[painting[0], 1] - right_end) < 0.4 * BESIDE_M
