@@ -169,7 +169,7 @@ class Sweep:
             yield None
             return
         from sim.flight.working import working
-        from sim.sweep.cluster import cluster_pool
+        from sim.sweep.pools import cluster_pool
 
         with contextlib.ExitStack() as stack:
             with working(notes, "Waiting for the cluster ..."):

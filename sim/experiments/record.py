@@ -18,10 +18,8 @@ from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.again import score_again
 from sim.sweep.design import Run
-from sim.sweep.paired import paired_differences
-from sim.sweep.parts import write_table
-from sim.sweep.statistics import cells, false_claims
-from sim.sweep.tables import read_tables
+from sim.sweep.parts import read_tables, write_table
+from sim.sweep.statistics import cells, false_claims, paired_differences
 
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.

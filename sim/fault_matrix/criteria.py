@@ -1,4 +1,4 @@
-"""Criteria of a flight with a fault; pure functions of its figures (`sim.evaluate.measures.fault`)."""
+"""Criteria of a flight with a fault; pure functions of its figures (`sim.evaluate.measures`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from ibvs_qp.command import SafetyState
 from ibvs_qp.config.vehicle import VehicleParams
-from sim.evaluate.measures.fault import STATES
+from sim.evaluate.measures import STATES
 from sim.faults.scenario import Expected, Scenario
 
 #: Largest tilt [deg], and in contact: there the propellers are 0.1 m from the wall.

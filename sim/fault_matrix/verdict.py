@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 
 from ibvs_qp.config.vehicle import VehicleParams
-from sim.evaluate.measures.fault import STATES
+from sim.evaluate.measures import STATES
 from sim.fault_matrix.criteria import Broken, Flown, broken
 from sim.fault_matrix.design import CONTROL, SUPERVISED
 from sim.faults.scenario import Expected, Scenario

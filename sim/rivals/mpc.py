@@ -15,8 +15,7 @@ from ibvs_qp.model.model import Model
 from ibvs_qp.model.reporting import clipped_command, contact_mode, reach_margin, reach_note
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.symbolic.function import BoundFunction
-from sim.rivals.horizon import MpcSettings
-from sim.rivals.prediction import Prediction
+from sim.rivals.prediction import MpcSettings, Prediction
 from sim.rivals.solver import BackedSolver
 
 #: Terms of the exponential's series: for a rotor lag of 0.05 s and a coarse step of 0.03 s the rest is below 1e-6.

@@ -11,10 +11,9 @@ import polars as pl
 
 from sim.sweep.design import Run
 from sim.sweep.fingerprint import listed_block
-from sim.sweep.parts import frame, part_file, write_table
+from sim.sweep.parts import frame, part_file, read_tables, write_table
 from sim.sweep.planned import Planned
 from sim.sweep.pools import Pool, fly_local
-from sim.sweep.tables import read_tables
 
 #: Receives the finished runs, all runs, the runs already on disk before, and the finished fraction 0..1 of the expected
 #: flying time of the others.

@@ -11,10 +11,9 @@ import cv2
 import numpy as np
 
 from sim.flight.trace import Trace
-from sim.video.drawing import PAPER
 from sim.video.outside import scene_points
 from sim.video.outside_camera import OutsideCamera
-from sim.video.panel import OUTSIDE_SIZE, Panel
+from sim.video.panel import OUTSIDE_SIZE, PAPER, Panel
 from sim.video.rasterizer import available
 
 FRAME_RATE_HZ = 10

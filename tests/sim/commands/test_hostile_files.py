@@ -18,7 +18,7 @@ from synthetic_trace import synthetic_trace
 import sim.flight.side_by_side
 import sim.storage.parquet
 import sim.sweep.flying
-import sim.sweep.tables
+import sim.sweep.parts
 from ibvs_qp.config.files import UnreadableFile
 from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
@@ -149,7 +149,7 @@ def test_parquet(
     refuses: Callable[..., str], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # none of these ends the process; that is tested in tests/sim/storage/test_storage.py
-    monkeypatch.setattr(sim.sweep.tables, "refuse_what_aborts", lambda files: None)
+    monkeypatch.setattr(sim.sweep.parts, "refuse_what_aborts", lambda files: None)
     table = pl.read_parquet(FOLDER.parents[2] / "docs" / "experiments" / "fair.parquet").head(40)
     table.write_parquet(stream := io.BytesIO())
     good = stream.getvalue()

@@ -10,8 +10,14 @@ import pytest
 from press_trace import press_trace
 from synthetic_trace import TOUCH_S, Errors, synthetic_trace
 
-from sim.evaluate.measures import fault_figures, loss_figures, paint_figures, paint_timed_figures, press_figures
-from sim.evaluate.measures.press import push_reach
+from sim.evaluate.measures import (
+    fault_figures,
+    loss_figures,
+    paint_figures,
+    paint_timed_figures,
+    press_figures,
+    push_reach,
+)
 from sim.evaluate.metrics import compute_metrics
 from sim.flight.trace import Event
 from sim.world.board import BoardGeometry

@@ -18,7 +18,7 @@ from sim.experiments.design import Choice, designs
 from sim.experiments.figures import CRASH, Results, draw, plot_medians
 from sim.experiments.page import Fields, results_page
 from sim.experiments.spec import experiment
-from sim.experiments.wording import cell, rounded
+from sim.experiments.verdict import cell, rounded
 from sim.sweep.parts import PARAM, frame
 
 TILT = "tilt_rms_deg"

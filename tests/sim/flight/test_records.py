@@ -16,15 +16,13 @@ from synthetic_trace import LIMITS, OUTCOMES, PHASES, synthetic_trace
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.symbolic.function import BoundFunction
 from sim.evaluate.metrics import compute_metrics
-from sim.flight import columns
 from sim.flight.assemble import euler_angles, in_body, rotations
 from sim.flight.closed_loop import fly
-from sim.flight.columns import Columns
-from sim.flight.journal import Header, Journal
-from sim.flight.log_check import check_arrays
+from sim.flight.journal import Columns, Header, Journal
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import Trace
+from sim.flight.unfinished import check_arrays
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
 from sim.world.plant import Plant
@@ -106,7 +104,7 @@ def test_noise_in_blocks_is_the_noise_drawn_one_by_one() -> None:
 
 
 def test_rows_come_back_in_order() -> None:
-    table = columns.Columns({"one": 1, "three": 3})
+    table = Columns({"one": 1, "three": 3})
     assert table.arrays()["one"].shape == (0,) and table.arrays()["three"].shape == (0, 3)
     for k in range(20):
         table.add(np.array((k, 10.0 * k)), np.array((20.0 * k, 30.0 * k)))

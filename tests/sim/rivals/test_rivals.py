@@ -18,8 +18,7 @@ from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.rivals import LEXICOGRAPHIC, MPC
-from sim.rivals.lexicographic import LexicographicController
-from sim.rivals.priorities import LEVELS, row_levels
+from sim.rivals.lexicographic import LEVELS, LexicographicController, row_levels
 
 #: Barriers off: the levels then compete within the thrust window alone.
 FREE = dataclasses.replace(ControllerConfig(), barriers=False)

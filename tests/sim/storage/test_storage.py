@@ -23,8 +23,7 @@ from sim.commands.cli import main
 from sim.storage.arrays import read_npy, read_npz
 from sim.storage.folder import locked_folder
 from sim.storage.parquet import refuse_what_aborts
-from sim.sweep.parts import frame, write_table
-from sim.sweep.tables import read_tables
+from sim.sweep.parts import frame, read_tables, write_table
 
 ARRAYS = {
     "law/t": np.linspace(0.0, 1.0, 50),

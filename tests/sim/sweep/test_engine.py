@@ -25,8 +25,7 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace_log import load_trace
 from sim.sweep import FlightPlan, Run, run_sweep
 from sim.sweep.fingerprint import configuration_hash
-from sim.sweep.paired import paired_differences
-from sim.sweep.statistics import cells, false_claims
+from sim.sweep.statistics import cells, false_claims, paired_differences
 
 
 def made_up(seed=0, law="qp", friction=0.3, **changes) -> Run:

@@ -20,9 +20,9 @@ from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_o
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, seeds, training
 from sim.tune.objectives import OBJECTIVES, PAINT, SATURATED, SLIDE, Score, refused, score
+from sim.tune.record import differences, objection
 from sim.tune.search import SearchPlan, finished, open_study, search
 from sim.tune.space import BY_HAND, GAIN_RANGES, Subject, from_unit, to_unit
-from sim.tune.verdict import differences, objection
 from sim.world.errors import world_errors
 from sim.world.random_scene import EVALUATION, TUNING, random_scene
 
