@@ -11,14 +11,19 @@ with app.setup:
 
     from allocation import TAROT_T960
     from sim.notebook.common import number, picture, table
-    from sim.notebook.vehicle import Duties, abilities, after_loss, cheapest, design_map, vehicle_case
-    from sim.notebook.vehicle_figures import (
+    from sim.notebook.vehicle import (
+        Duties,
+        abilities,
+        after_loss,
+        cheapest,
+        design_map,
         draw_cuts,
         draw_design_map,
         draw_sliding,
         draw_thrusts,
         draw_tip,
         draw_weak_rotor,
+        vehicle_case,
     )
 
     def abilities_table(case, friction):

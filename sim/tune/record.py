@@ -19,9 +19,8 @@ from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
 from sim.sweep.parts import PARAM, write_table
 from sim.sweep.statistics import median_interval, needed, spread
-from sim.tune.choice import front, gain_over
 from sim.tune.finalists import SHIPPED, TUNED, Finalist, best_of, shipped_score
-from sim.tune.objectives import OBJECTIVES, TASK, Score
+from sim.tune.objectives import OBJECTIVES, TASK, Score, front, gain_over
 from sim.tune.search import SearchPlan, Trials
 
 

@@ -16,10 +16,25 @@ import sim.tune.flights
 from ibvs_qp.pilot import PilotConfig
 from sim.commands.cli import main
 from sim.rivals import MPC
-from sim.tune.choice import STEEP, allowed, contact_damping, cost, front, gain_over, less_damped, ranked
 from sim.tune.finalists import Finalist, best_of, fly_finalists
 from sim.tune.flights import CHOICE_SEED, REPORT_SEED, SEARCH_SEED, WORLD, checks, flights, seeds, training
-from sim.tune.objectives import OBJECTIVES, PAINT, SATURATED, SLIDE, Score, refused, score
+from sim.tune.objectives import (
+    OBJECTIVES,
+    PAINT,
+    SATURATED,
+    SLIDE,
+    STEEP,
+    Score,
+    allowed,
+    contact_damping,
+    cost,
+    front,
+    gain_over,
+    less_damped,
+    ranked,
+    refused,
+    score,
+)
 from sim.tune.record import differences, objection
 from sim.tune.search import SearchPlan, finished, open_study, search
 from sim.tune.space import BY_HAND, GAIN_RANGES, Subject, from_unit, to_unit
