@@ -27,9 +27,9 @@ with app.setup:
         success_table,
         sweep_or_sample,
     )
+    from sim.sweep.design import configuration_hash
     from sim.sweep.figures.boxes import draw_boxes
     from sim.sweep.figures.maps import draw_figure_maps, draw_success_maps
-    from sim.sweep.fingerprint import configuration_hash
     from sim.sweep.spec import LAWS
 
 

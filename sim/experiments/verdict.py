@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from sim.experiments.criteria import Criterion
-from sim.experiments.spec import Column, Experiment
+from sim.experiments.spec import Column, Criterion, Experiment
 from sim.sweep.statistics import parameters, select, split, spread
 
 

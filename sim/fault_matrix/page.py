@@ -16,7 +16,7 @@ from allocation import WrenchFacets, least_hover_tilt
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.frames import GRAVITY
 from sim.evaluate.table import markdown
-from sim.fault_matrix.criteria import (
+from sim.fault_matrix.verdict import (
     ADVANCE_M,
     LEAVE_S,
     PUSH_N,
@@ -24,8 +24,9 @@ from sim.fault_matrix.criteria import (
     SPEED_M_S,
     TILT_CONTACT_DEG,
     TILT_DEG,
+    Tally,
+    Verdict,
 )
-from sim.fault_matrix.verdict import Tally, Verdict
 from sim.faults.fault import Fault
 from sim.faults.rotors import RotorFault
 from sim.faults.scenario import WATCH_S, Scenario

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from sim.evaluate.paint_plan import band_mask, nominal_plan
+from sim.evaluate.paint_plan import CORNER_M, band_mask, nominal_plan, path_error
 from sim.evaluate.part import Part
-from sim.evaluate.path_error import CORNER_M, path_error
 from sim.evaluate.window import board_tip
 from sim.figures.style import REFERENCE, law_colour, law_panels, legend_above, new_figure, shade_phases, thin
 from sim.flight.pictures import unpack_picture

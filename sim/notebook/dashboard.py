@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ibvs_qp.config.vehicle import VehicleParams
-from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.paint_plan import CONTACT_N
 from sim.evaluate.window import tilt_deg
 from sim.figures.style import REFERENCE, note_empty
 from sim.flight.trace import Trace

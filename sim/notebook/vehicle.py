@@ -1,4 +1,4 @@
-"""Notebook 04: vehicle in level flight at a wall and after the loss of a rotor, choice of a design, and figures of both."""
+"""Notebook 04: vehicle in level flight at a wall and after the loss of a rotor, choice of a design, their figures."""
 
 from __future__ import annotations
 

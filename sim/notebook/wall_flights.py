@@ -14,7 +14,7 @@ import ibvs_qp
 from allocation import control_effectiveness
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.paint_plan import CONTACT_N
 from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
 from sim.experiments.variants import VARIANTS

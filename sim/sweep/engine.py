@@ -9,8 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
-from sim.sweep.design import Run
-from sim.sweep.fingerprint import listed_block
+from sim.sweep.design import Run, listed_block
 from sim.sweep.parts import frame, part_file, read_tables, write_table
 from sim.sweep.planned import Planned
 from sim.sweep.pools import Pool, fly_local

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError, IbvsQpError
-from sim.sweep.design import Block
-from sim.sweep.fingerprint import code_hash
+from sim.sweep.design import Block, code_hash
 from sim.sweep.flying import Row, fly_block
 
 #: Flies blocks in any order and yields name and rows of each when it is finished.

@@ -1,4 +1,4 @@
-"""Objectives of the search, and the choice of one preset: nowhere clearly worse than the shipped one, best on the whole."""
+"""Objectives of the search, and the choice of one preset: nowhere clearly worse than the shipped one, best overall."""
 
 from __future__ import annotations
 

@@ -12,9 +12,8 @@ import numpy as np
 
 from sim.flight.trace import Trace
 from sim.video.outside import scene_points
-from sim.video.outside_camera import OutsideCamera
 from sim.video.panel import OUTSIDE_SIZE, PAPER, Panel
-from sim.video.rasterizer import available
+from sim.video.rasterizer import OutsideCamera, available
 
 FRAME_RATE_HZ = 10
 #: Constant quality of H.264: 23 is the encoder's default, lower is better.

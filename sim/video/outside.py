@@ -14,8 +14,17 @@ from ibvs_qp.frames import rotation_from_quaternion
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.surroundings import PAINTING_FORCE
 from sim.flight.trace import Trace
-from sim.video.outside_camera import OutsideCamera
-from sim.video.rasterizer import OVERSAMPLING, Rasterizer, Triangles, cast, darken, geom_triangles, light_on, shadow
+from sim.video.rasterizer import (
+    OVERSAMPLING,
+    OutsideCamera,
+    Rasterizer,
+    Triangles,
+    cast,
+    darken,
+    geom_triangles,
+    light_on,
+    shadow,
+)
 from sim.world.board import BoardGeometry
 from sim.world.canvas import TEXTURE_PAD_PX, Canvas
 from sim.world.mjcf import build_model

@@ -8,7 +8,7 @@ import numpy as np
 from sim.flight.pictures import unpack_picture
 from sim.flight.trace import Trace, law_name
 from sim.video.outside import OutsideView
-from sim.video.outside_camera import OutsideCamera
+from sim.video.rasterizer import OutsideCamera
 
 INK, PAPER, GRID, REFERENCE = (40, 40, 40), (250, 250, 250), (215, 215, 215), (120, 120, 120)
 _LAWS = {"qp": (11, 111, 158), "paper": (213, 94, 26)}

@@ -1,4 +1,4 @@
-"""``--strategy`` and ``--world``: flown by name, stated in every record, refused in one line before anything is written."""
+"""``--strategy`` and ``--world``: flown by name, stated in every record, refused in one line."""
 
 from __future__ import annotations
 

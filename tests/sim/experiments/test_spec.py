@@ -13,10 +13,9 @@ import sim.experiments
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import load_toml
 from sim.experiments import FAIR, NAMES
-from sim.experiments.criteria import EVERY, Bound, Criteria, Criterion
 from sim.experiments.design import Choice, design
 from sim.experiments.figures import KINDS
-from sim.experiments.spec import SPECS, Experiment, experiment
+from sim.experiments.spec import EVERY, SPECS, Bound, Criteria, Criterion, Experiment, experiment
 from sim.experiments.verdict import GOALS, evaluate, verdicts
 from sim.world.errors import WorldErrors, single_errors, world_errors
 from sim.world.plant_scene import PlantScene

@@ -10,10 +10,9 @@ import pytest
 from good_flight import GOOD, VEHICLE
 
 from ibvs_qp.config.errors import ConfigError
-from sim.fault_matrix.criteria import Flown, broken
 from sim.fault_matrix.design import CONTROL, SUPERVISED, Choice, design, job_scene
 from sim.fault_matrix.page import hovers, limits_after, page
-from sim.fault_matrix.verdict import verdicts
+from sim.fault_matrix.verdict import Flown, broken, verdicts
 from sim.faults.rotors import RotorStuck, ThrustLoss
 from sim.faults.scenario import PLACES, Expected, Scenario, scenario, scenarios
 from sim.world.true_vehicle import true_vehicle

@@ -23,7 +23,7 @@ from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.own_law import own_law
 from sim.rivals import LEXICOGRAPHIC, MPC
 from sim.sweep import Planned, load_spec
-from sim.sweep.fingerprint import configuration_hash
+from sim.sweep.design import configuration_hash
 
 CONFIG = ibvs_qp.preset("qp").controller
 POLICY = f"{Path(__file__).parents[3] / 'examples' / 'own_controller.py'}:ResidualPolicy"

@@ -24,7 +24,7 @@ from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace_log import load_trace
 from sim.sweep import FlightPlan, Run, run_sweep
-from sim.sweep.fingerprint import configuration_hash
+from sim.sweep.design import configuration_hash
 from sim.sweep.statistics import cells, false_claims, paired_differences
 
 
@@ -81,7 +81,7 @@ def test_a_changed_setting_is_flown_anew(flown, tmp_path):
 
 def test_changed_flight_code_is_flown_anew(flown, tmp_path, monkeypatch):
     run_sweep([made_up(1)], tmp_path)
-    monkeypatch.setattr("sim.sweep.fingerprint.code_hash", lambda: "other code")
+    monkeypatch.setattr("sim.sweep.design.code_hash", lambda: "other code")
     run_sweep([made_up(1)], tmp_path)
     assert flown == [1, 1]
 

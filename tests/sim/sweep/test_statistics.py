@@ -11,9 +11,8 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from sim.experiments import NAMES
-from sim.experiments.criteria import EVERY, Criterion
 from sim.experiments.design import Choice, designs
-from sim.experiments.spec import experiment
+from sim.experiments.spec import EVERY, Criterion, experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
 from sim.sweep.parts import frame, write_table
