@@ -28,8 +28,7 @@ with app.setup:
         sweep_or_sample,
     )
     from sim.sweep.design import configuration_hash
-    from sim.sweep.figures.boxes import draw_boxes
-    from sim.sweep.figures.maps import draw_figure_maps, draw_success_maps
+    from sim.sweep.figures.maps import draw_boxes, draw_figure_maps, draw_success_maps
     from sim.sweep.spec import LAWS
 
 

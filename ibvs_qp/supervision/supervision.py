@@ -30,8 +30,7 @@ from ibvs_qp.supervision.monitors import (
     Tick,
     WallMonitor,
 )
-from ibvs_qp.supervision.rotor_loss import RotorLoss
-from ibvs_qp.supervision.rotor_monitor import RotorMonitor
+from ibvs_qp.supervision.rotor_monitor import RotorLoss, RotorMonitor
 from ibvs_qp.validation.load_check import LoadCheck
 from ibvs_qp.validation.self_check import SelfCheck
 

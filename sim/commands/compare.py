@@ -159,7 +159,7 @@ class Compare:
 def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path, world: str) -> None:
     from rich.console import Console
 
-    from sim.evaluate.flight_table import LINES
+    from sim.evaluate.metrics import LINES
     from sim.evaluate.table import plain, terminal_table
     from sim.flight.trace import law_name
     from sim.report.comparison import ABSENT, PAINT_VARIANT

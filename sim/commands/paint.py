@@ -181,8 +181,7 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
-        from sim.evaluate.flight_table import false_claims, figure_table
-        from sim.evaluate.metrics import compute_metrics
+        from sim.evaluate.metrics import compute_metrics, false_claims, figure_table
         from sim.evaluate.table import plain
         from sim.flight.trace import INTERRUPTED
         from sim.flight.working import working

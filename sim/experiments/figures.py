@@ -26,9 +26,8 @@ from sim.figures import FIGURES
 from sim.figures.style import REFERENCE, law_colour, law_name, legend_below, new_figure, note_empty
 from sim.flight.flight_log import load_run
 from sim.flight.trace import Trace
-from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import varied
-from sim.sweep.figures.maps import draw_figure_maps
+from sim.sweep.figures.maps import draw_boxes, draw_figure_maps
 from sim.sweep.parts import PARAM
 from sim.sweep.spec import LAWS
 from sim.sweep.statistics import completed, median_interval, select

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from sim.evaluate.flight_table import LINES, false_claims, shown
+from sim.evaluate.metrics import LINES, false_claims, shown
 from sim.flight.pictures import pack_picture
 from sim.flight.trace import Trace, law_name
 from sim.storage.atomic import write_text

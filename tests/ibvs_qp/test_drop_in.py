@@ -99,7 +99,7 @@ def test_importing_the_controller_loads_numpy_and_casadi_alone() -> None:
     assert not {name.split(".")[0] for name in modules} & {"scipy", "osqp", "qpsolvers", "jinja2", "tomli_w", "cv2"}
     # Of the own packages only the laws: no painting strategy or pilot, and of vision one matrix.
     parts = {name for name in modules if name.split(".")[0] == "ibvs_qp"}
-    assert not parts & {"ibvs_qp.pilot.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_loss"}
+    assert not parts & {"ibvs_qp.pilot.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_monitor"}
     assert not any(name.startswith("ibvs_qp.vision") for name in parts)
 
 

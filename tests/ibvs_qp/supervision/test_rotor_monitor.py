@@ -14,8 +14,7 @@ from allocation import allocate_least_squares, control_effectiveness
 from ibvs_qp.config import SafetySettings
 from ibvs_qp.config.gains import Gains
 from ibvs_qp.config.vehicle import VehicleParams
-from ibvs_qp.supervision.rotor_loss import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss
-from ibvs_qp.supervision.rotor_monitor import RotorMonitor
+from ibvs_qp.supervision.rotor_monitor import ESCAPE_DISTANCE, TILT_BOUND, TILT_RATE, RotorLoss, RotorMonitor
 
 VEHICLE = VehicleParams()
 MATRIX = control_effectiveness(VEHICLE.geometry)

@@ -121,7 +121,6 @@ def same(one, other):
 @pytest.mark.slow
 def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path, capsys):
     words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
-    monkeypatch.setattr("sim.sweep.flying.outcome", sim.sweep.flying.outcome)
     main([*words, "--traces"])
     count, content = len(flown), json.loads(capsys.readouterr().out)
     main([*words, "--again"])
@@ -137,7 +136,6 @@ def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path
 
 
 def test_traces_of_another_configuration_are_flown_anew(flown, monkeypatch):
-    monkeypatch.setattr("sim.sweep.flying.outcome", sim.sweep.flying.outcome)
     words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
     main([*words, "--traces"])
     count = len(flown)

@@ -147,7 +147,7 @@ def test_killed_half_way_and_resumed_gives_the_same_table(flown):
 @pytest.mark.slow
 def test_a_dask_cluster_gives_the_same_table(flown, tmp_path):
     distributed = pytest.importorskip("distributed", reason="a Dask cluster needs the extra cluster")
-    from sim.sweep.pools import dask_pool, require_usable
+    from sim.sweep.engine import dask_pool, require_usable
 
     design = Planned(load_spec(tmp_path / "spec.toml"))
     alone = run_sweep(design, tmp_path / "alone", block_runs=3).table
@@ -161,9 +161,9 @@ def test_a_dask_cluster_gives_the_same_table(flown, tmp_path):
 
 def test_clusters_that_cannot_fly_are_refused_by_name(flown, monkeypatch, capsys):
     distributed = pytest.importorskip("distributed", reason="a Dask cluster needs the extra cluster")
-    import sim.sweep.pools
+    import sim.sweep.engine
 
-    monkeypatch.setattr(sim.sweep.pools, "CONNECT_S", 0.5)
+    monkeypatch.setattr(sim.sweep.engine, "CONNECT_S", 0.5)
     assert main(["sweep", "spec.toml", "--scheduler", "tcp://127.0.0.1:9"]) == 2
     assert "tcp://127.0.0.1:9" in capsys.readouterr().err.splitlines()[-1]
     settings = {"processes": False, "n_workers": 1, "threads_per_worker": 3, "dashboard_address": None}

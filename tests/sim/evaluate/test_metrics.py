@@ -11,8 +11,7 @@ import pytest
 from rich.console import Console
 from synthetic_trace import PHYSICS_PER_TICK, TOUCH_S, Errors, synthetic_trace
 
-from sim.evaluate.flight_table import LINES, figure_table
-from sim.evaluate.metrics import compute_metrics
+from sim.evaluate.metrics import LINES, compute_metrics, figure_table
 from sim.evaluate.paint_plan import band_mask, distance_to_polyline, nominal_plan, plan_as_painted
 from sim.world.board import BoardGeometry
 from sim.world.scene import BoardScene, PaintScene, Scene

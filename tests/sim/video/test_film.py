@@ -14,8 +14,7 @@ from synthetic_trace import synthetic_trace
 from sim.flight.pictures import pack_pictures, unpack_picture
 from sim.video import film
 from sim.video.animation import LAST_MS, RATE_HZ, WIDTH, write_webp
-from sim.video.film import FRAME_RATE_HZ, encode, film_frames, write_video
-from sim.video.panel import OUTSIDE_SIZE, TITLE_HEIGHT
+from sim.video.film import FRAME_RATE_HZ, OUTSIDE_SIZE, TITLE_HEIGHT, encode, film_frames, write_video
 from sim.world.scene import PaintScene, Scene
 
 SCENE = Scene(paint=PaintScene(stroke_m=0.2, rows=1))
