@@ -1,8 +1,13 @@
-"""What summary.json must look like, as a checker that names the first thing that is wrong."""
+"""Contract of the commands: summary.json, by a checker that names the first wrong entry, and a refusal in one line."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+import pytest
+
+from sim.commands.cli import main
 
 NUMBER = (int, float, type(None))  # non-finite numbers are null
 M_NUMBERS = (
@@ -60,3 +65,11 @@ def check_summary(summary: dict[str, Any], laws: set[str]) -> None:
     assert set(summary["laws"]) == laws
     for metrics in summary["laws"].values():
         check_metrics(metrics)
+
+
+def refusal(words: Sequence[str], captured: pytest.CaptureFixture[str]) -> str:
+    """The message of a refused command: exit code 2, one line on standard error, nothing on standard output."""
+    assert main(list(words)) == 2
+    out, err = captured.readouterr()
+    assert out == "" and err.count("\n") == 1 and err.startswith("ibvs-qp: error: "), err
+    return err
