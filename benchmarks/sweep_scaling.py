@@ -21,8 +21,7 @@ from pathlib import Path
 from joblib.externals.loky import get_reusable_executor
 
 from sim.sweep import Planned, run_sweep
-from sim.sweep.cluster import cluster_pool
-from sim.sweep.pools import Pool
+from sim.sweep.engine import Pool, cluster_pool
 from sim.sweep.spec import parse_spec
 
 SPEC = """

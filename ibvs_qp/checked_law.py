@@ -17,8 +17,7 @@ from ibvs_qp.measurement import Measurement, Reference
 from ibvs_qp.model.reporting import check_contact, hover_command
 from ibvs_qp.model.setpoints import Setpoints
 from ibvs_qp.validation.failure import raised
-from ibvs_qp.validation.measurement import MeasurementGate, answered_stamp
-from ibvs_qp.validation.reference import ReferenceGate
+from ibvs_qp.validation.measurement import MeasurementGate, ReferenceGate, answered_stamp
 
 #: Without a measured velocity the integral alone moves the vehicle: a slide falls short.
 NO_VELOCITY = "velocity: missing, tracking of the reference's velocity is degraded"

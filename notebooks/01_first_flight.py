@@ -8,9 +8,8 @@ with app.setup:
 
     from sim.evaluate.metrics import compute_metrics
     from sim.figures import draw_board, draw_force, draw_image_error, draw_path
+    from sim.notebook.common import number, picture, table
     from sim.notebook.first_flight import draw_camera, draw_moment, fly_first, moment_text
-    from sim.notebook.picture import picture
-    from sim.notebook.table import number, table
 
 
 @app.cell(hide_code=True)

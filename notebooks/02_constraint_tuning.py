@@ -9,10 +9,20 @@ with app.setup:
     import marimo as mo
 
     from ibvs_qp.config.errors import ConfigError
+    from sim.notebook.common import picture
     from sim.notebook.dashboard import draw_dashboard
-    from sim.notebook.knobs import GROUPS, KNOBS, knob_values
-    from sim.notebook.picture import picture
-    from sim.notebook.tuning import Start, TuningBench, compare_pair, load_setting, load_start, save_setting, save_text
+    from sim.notebook.tuning import (
+        GROUPS,
+        KNOBS,
+        Start,
+        TuningBench,
+        compare_pair,
+        knob_values,
+        load_setting,
+        load_start,
+        save_setting,
+        save_text,
+    )
     from sim.notebook.wall_flights import Setting, flights_table, fly_setting
     from sim.notebook.what_if import LiveFlight, RecordedTicks
 

@@ -11,10 +11,8 @@ with app.setup:
     import marimo as mo
     import numpy as np
 
+    from sim.notebook.common import number, picture, table, unless_short
     from sim.notebook.laws import agreement, draw_agreement, draw_difference, draw_flown, draw_given_up
-    from sim.notebook.picture import picture
-    from sim.notebook.short import unless_short
-    from sim.notebook.table import number, table
     from sim.notebook.wall_flights import WallTask, flight_figures, flights_table, record_flight
 
     LAWS = (("QP law", "qp"), ("analytic law", "paper"))

@@ -10,16 +10,20 @@ with app.setup:
     import numpy as np
 
     from allocation import TAROT_T960
-    from sim.notebook.picture import picture
-    from sim.notebook.table import number, table
-    from sim.notebook.vehicle import Duties, abilities, after_loss, cheapest, design_map, vehicle_case
-    from sim.notebook.vehicle_figures import (
+    from sim.notebook.common import number, picture, table
+    from sim.notebook.vehicle import (
+        Duties,
+        abilities,
+        after_loss,
+        cheapest,
+        design_map,
         draw_cuts,
         draw_design_map,
         draw_sliding,
         draw_thrusts,
         draw_tip,
         draw_weak_rotor,
+        vehicle_case,
     )
 
     def abilities_table(case, friction):

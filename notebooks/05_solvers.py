@@ -11,8 +11,7 @@ with app.setup:
 
     from ibvs_qp.config import SolverSettings
     from sim.figures.style import legend_below, new_figure
-    from sim.notebook.picture import picture
-    from sim.notebook.short import unless_short
+    from sim.notebook.common import picture, unless_short
     from sim.notebook.solvers import (
         NEVER,
         contenders,

@@ -12,6 +12,7 @@ with app.setup:
 
     from sim.figures import draw_force, draw_path
     from sim.figures.style import law_name
+    from sim.notebook.common import number, picture, table, unless_short
     from sim.notebook.noise import (
         FIGURES,
         FORCE,
@@ -26,12 +27,8 @@ with app.setup:
         success_table,
         sweep_or_sample,
     )
-    from sim.notebook.picture import picture
-    from sim.notebook.short import unless_short
-    from sim.notebook.table import number, table
-    from sim.sweep.figures.boxes import draw_boxes
-    from sim.sweep.figures.maps import draw_figure_maps, draw_success_maps
-    from sim.sweep.fingerprint import configuration_hash
+    from sim.sweep.design import configuration_hash
+    from sim.sweep.figures.maps import draw_boxes, draw_figure_maps, draw_success_maps
     from sim.sweep.spec import LAWS
 
 

@@ -71,8 +71,7 @@ class Compare:
         from rich.console import Console
 
         from sim.flight.working import working
-        from sim.report.comparison import compare, read_run
-        from sim.report.conditions import differing_presets, differing_runs, run_world
+        from sim.report.comparison import compare, differing_presets, differing_runs, read_run, run_world
         from sim.report.rundir import as_json
 
         folder, stopped, presets = None, False, self._presets()
@@ -160,11 +159,10 @@ class Compare:
 def _print(conditions: list[dict[str, Any]], cells: list[dict[str, Any]], a: Path, b: Path, world: str) -> None:
     from rich.console import Console
 
-    from sim.evaluate.flight_table import LINES
+    from sim.evaluate.metrics import LINES
     from sim.evaluate.table import plain, terminal_table
     from sim.flight.trace import law_name
-    from sim.report.comparison import PAINT_VARIANT
-    from sim.report.conditions import ABSENT
+    from sim.report.comparison import ABSENT, PAINT_VARIANT
     from sim.sweep.statistics import needed, spread
 
     console, names = Console(), ("A", "B")

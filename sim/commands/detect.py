@@ -103,7 +103,7 @@ class Detect:
 
     def _files(self, update: Callable[[str], None], folder: Path | None) -> list[FrameResult]:
         """Results of one frame or a folder."""
-        from sim.detection.overlay import write_overlay
+        from sim.detection.report import write_overlay
         from sim.detection.run import detect_frames
         from sim.evaluate.table import plain
 
@@ -124,7 +124,7 @@ class Detect:
         from ibvs_qp.config.settings import load_toml
         from ibvs_qp.interfaces.ros.bag import Bag
         from ibvs_qp.interfaces.ros.topics import Topics
-        from sim.detection.overlay import write_overlay
+        from sim.detection.report import write_overlay
         from sim.detection.run import detect_bag
         from sim.evaluate.table import plain
 

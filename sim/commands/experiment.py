@@ -106,7 +106,7 @@ class ExperimentCommand:
         from sim.flight.working import working
         from sim.report.rundir import as_json
         from sim.sweep import run_sweep
-        from sim.sweep.again import in_order
+        from sim.sweep.flying import in_order
         from sim.sweep.parts import HEAD
         from sim.sweep.progress import sweep_progress
 

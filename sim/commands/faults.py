@@ -72,7 +72,7 @@ class Faults:
         from rich.console import Console
 
         from sim.fault_matrix.design import NAME, Choice, design, job_scene, pilot_of
-        from sim.fault_matrix.record import PARTS, summary, write
+        from sim.fault_matrix.page import PARTS, summary, write
         from sim.fault_matrix.verdict import verdicts
         from sim.flight.working import working
         from sim.report.rundir import RunFolder, as_json
@@ -128,9 +128,8 @@ class Faults:
     def _page(self, found: Sequence[Verdict], choice: Choice, flights: int) -> str:
         from importlib.metadata import version
 
-        from sim.fault_matrix.attainable import hovers
         from sim.fault_matrix.design import job_scene, pilot_of
-        from sim.fault_matrix.page import page
+        from sim.fault_matrix.page import hovers, page
 
         vehicle = pilot_of("supervised").controller.vehicle
         left = hovers(choice.rows, {world: job_scene(world) for world in choice.worlds}, vehicle)

@@ -110,8 +110,8 @@ class Paint:
         from sim.flight.options import FlightOptions, pilot_config, sized
         from sim.flight.own_law import check_own
         from sim.flight.preflight import check_job
-        from sim.flight.progress import flight_progress
         from sim.flight.side_by_side import fly_laws
+        from sim.flight.working import flight_progress
         from sim.report.rundir import RunFolder
         from sim.vehicles.configuration import require_vehicle, with_camera
         from sim.vehicles.vehicle_file import read_vehicle
@@ -181,13 +181,12 @@ class Paint:
     ) -> int:
         from rich.console import Console
 
-        from sim.evaluate.flight_table import false_claims, figure_table
-        from sim.evaluate.metrics import compute_metrics
+        from sim.evaluate.metrics import compute_metrics, false_claims, figure_table
         from sim.evaluate.table import plain
         from sim.flight.trace import INTERRUPTED
         from sim.flight.working import working
+        from sim.report.report import own_classes
         from sim.report.rundir import as_json, peak_memory, summary
-        from sim.report.wording import own_classes
 
         traces = {law: flight.trace for law, flight in flights.items()}
         with working(notes, "Computing the figures of merit ..."):

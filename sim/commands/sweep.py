@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from sim.sweep import Planned, SweepResult
-    from sim.sweep.pools import Pool
+    from sim.sweep.engine import Pool
 
 PARTS = "parts"
 
@@ -169,7 +169,7 @@ class Sweep:
             yield None
             return
         from sim.flight.working import working
-        from sim.sweep.cluster import cluster_pool
+        from sim.sweep.engine import cluster_pool
 
         with contextlib.ExitStack() as stack:
             with working(notes, "Waiting for the cluster ..."):

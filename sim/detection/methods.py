@@ -6,7 +6,7 @@ import importlib
 from typing import Any
 
 #: Module and class of every method; imported on use, for a quick help of the command.
-METHODS = {"own": ("sim.detection.own", "OwnMethod"), "paper": ("sim.detection.paper", "PaperMethod")}
+METHODS = {"own": ("sim.detection.own", "OwnMethod"), "paper": ("sim.detection.own", "PaperMethod")}
 
 
 def make_method(name: str) -> Any:

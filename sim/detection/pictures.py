@@ -12,9 +12,8 @@ from ibvs_qp.config.files import UnreadableFile, read_bytes
 from ibvs_qp.measurement import RgbdFrame
 from ibvs_qp.vision.picture.camera import to_color
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
-from sim.storage.arrays import read_npy, read_npz
+from sim.storage.arrays import no_library_output, read_npy, read_npz
 from sim.storage.limits import LARGEST_PICTURE, LONGEST_SIDE
-from sim.storage.quiet import no_library_output
 
 
 class PictureError(IbvsQpError):

@@ -8,17 +8,50 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ibvs_qp.measurement import RgbdFrame
-from ibvs_qp.vision.picture.camera import RgbdCamera
+from ibvs_qp.vision.picture.camera import Lens, RgbdCamera
+from ibvs_qp.vision.picture.picture import denormalise, normalise
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
 from sim.detection.detection import Detection
 from sim.detection.manifest import FrameEntry, motion_sequences
 from sim.detection.methods import make_method
 from sim.detection.pictures import PictureError, read_frame
-from sim.detection.raw_pixels import ideal_pixel, raw_pixels
 
 if TYPE_CHECKING:
     from ibvs_qp.interfaces.ros.bag import Bag
+
+
+#: Farthest a point may lie from the corner, in widths of the picture: far outside a lens model is undefined.
+_FARTHEST = 2.0
+
+
+def ideal_pixel(
+    pixel: tuple[float, float] | None, lens: Lens, intrinsics: tuple[float, float, float, float]
+) -> tuple[float, float] | None:
+    """Place of a pixel of the picture as taken in the rectified one [px]; None where the lens model has none."""
+    if pixel is None or lens.none:
+        return pixel
+    u, v = denormalise(lens.ideal(np.array([pixel]), intrinsics), intrinsics)[0].tolist()
+    return (u, v) if np.isfinite((u, v)).all() else None
+
+
+def raw_pixels(detection: Any, lens: Lens, frame: RgbdFrame) -> Any:
+    """The detection with the end points of its lines in the picture as taken; (rho, theta) stay as they are."""
+    if lens.none:
+        return detection
+    farthest = _FARTHEST * max(frame.rgb.shape[:2])
+
+    def bent(line: Any) -> Any:
+        if line is None:
+            return None
+        pixels = lens.pixels(normalise(line.pixels, frame.intrinsics), frame.intrinsics)
+        return dataclasses.replace(line, pixels=np.clip(np.nan_to_num(pixels), -farthest, farthest))
+
+    guides = {side: bent(line) for side, line in detection.guides.items()}
+    return dataclasses.replace(detection, guides=guides, candidates=tuple(map(bent, detection.candidates)))
+
 
 #: Frame interval of a sequence of unknown rate [ns]: 30 Hz.
 _INTERVAL_NS = 33_333_333

@@ -8,8 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.evaluate.paint_plan import PaintPlan, Segment, band_mask, nominal_plan
-from sim.evaluate.path_error import PathError, path_error
+from sim.evaluate.paint_plan import PaintPlan, PathError, Segment, band_mask, nominal_plan, path_error
 from sim.evaluate.strokes import Stroke, contact_share, on_board
 from sim.evaluate.truth import Assessment
 from sim.evaluate.window import SETTLED_S, board_tip, contact_clock, in_phase, physics_ticks, tilt_deg, touch_figures

@@ -15,8 +15,7 @@ from sim.evaluate.figures import figure_of
 from sim.experiments.spec import Column, Experiment
 from sim.experiments.variants import VARIANTS
 from sim.flight.trace import law_name
-from sim.sweep.paired import differences, exact_interval
-from sim.sweep.statistics import needed, parameters, split
+from sim.sweep.statistics import differences, exact_interval, needed, parameters, split
 
 #: Metric of the flights that only one law completes.
 COMPLETED = "completed"

@@ -14,12 +14,19 @@ from sim.evaluate.table import markdown
 from sim.experiments.comparison import Comparison, Outcome, comparisons, grouped, opponent_name
 from sim.experiments.spec import Experiment
 from sim.experiments.variants import VARIANTS
-from sim.experiments.verdict import Verdict, verdicts
-from sim.experiments.wording import cell, entry, headings, interval, measured, value_of
+from sim.experiments.verdict import Verdict, cell, entry, headings, interval, measured, value_of, verdicts
 from sim.flight.trace import law_name
-from sim.sweep.mixed import Ratio, law_and_gains
-from sim.sweep.paired import exact_interval
-from sim.sweep.statistics import cells, false_claims, needed, parameters, select, split
+from sim.sweep.statistics import (
+    Ratio,
+    cells,
+    exact_interval,
+    false_claims,
+    law_and_gains,
+    needed,
+    parameters,
+    select,
+    split,
+)
 
 TEMPLATE = Path(__file__).with_name("page.md.jinja")
 #: The QP as shipped.

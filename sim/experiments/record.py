@@ -16,12 +16,10 @@ from sim.experiments.verdict import Verdict, verdicts
 from sim.figures.style import save, styled
 from sim.report.rundir import write_json
 from sim.storage.atomic import write_text
-from sim.sweep.again import score_again
 from sim.sweep.design import Run
-from sim.sweep.paired import paired_differences
-from sim.sweep.parts import write_table
-from sim.sweep.statistics import cells, false_claims
-from sim.sweep.tables import read_tables
+from sim.sweep.flying import score_again
+from sim.sweep.parts import read_tables, write_table
+from sim.sweep.statistics import cells, false_claims, paired_differences
 
 SCHEMA = 1
 #: Folder of parts and logs, under the folder of the experiment.
@@ -108,7 +106,7 @@ def write_tables(folder: Path, name: str, experiments: Sequence[Experiment], tab
 
 
 def flights_again(folder: Path, name: str, runs: Sequence[Run], workers: int) -> tuple[pl.DataFrame, list[Run]]:
-    """Rows by the traces of a folder, and the runs without a trace (`sim.sweep.again`)."""
+    """Rows by the traces of a folder, and the runs without a trace (`sim.sweep.flying`)."""
     file = data_file(folder, name)
     return score_again(runs, read_tables([file] if file.exists() else []), folder / PARTS, workers)
 

@@ -1,14 +1,22 @@
-"""The page of the fault matrix as Markdown; every number comes from the table of flights."""
+"""Page, table and summary of the fault matrix; every number comes from the table of flights."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
+import polars as pl
+
+from allocation import WrenchFacets, least_hover_tilt
 from ibvs_qp.config.vehicle import VehicleParams
+from ibvs_qp.frames import GRAVITY
 from sim.evaluate.table import markdown
-from sim.fault_matrix.attainable import Hover, in_words
-from sim.fault_matrix.criteria import (
+from sim.fault_matrix.verdict import (
     ADVANCE_M,
     LEAVE_S,
     PUSH_N,
@@ -16,9 +24,87 @@ from sim.fault_matrix.criteria import (
     SPEED_M_S,
     TILT_CONTACT_DEG,
     TILT_DEG,
+    Tally,
+    Verdict,
 )
-from sim.fault_matrix.verdict import Tally, Verdict
-from sim.faults.scenario import WATCH_S
+from sim.faults.fault import Fault
+from sim.faults.rotors import RotorFault
+from sim.faults.scenario import WATCH_S, Scenario
+from sim.report.rundir import write_json
+from sim.sweep.parts import write_table
+from sim.world.errors import RotorErrors
+from sim.world.scene import Scene
+from sim.world.true_vehicle import TrueVehicle, true_vehicle
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hover:
+    """Least tilt of a hover after a fault [deg], over all rotors that it may hit; inf without one."""
+
+    row: str
+    world: str
+    turning: float  # the vehicle may turn about its vertical axis
+    heading: float  # it must not
+
+
+def hovers(rows: Sequence[Scenario], scenes: dict[str, Scene], nominal: VehicleParams) -> list[Hover]:
+    """The hover that is left by every row with a fault of rotors.
+
+    Args:
+        rows: Rows of the matrix.
+        scenes: Scene of every world, by name.
+        nominal: Vehicle of the controller.
+    """
+    facets, names, found = WrenchFacets(nominal.geometry), nominal.geometry.names, []
+    for row in rows:
+        if not all(isinstance(fault, RotorFault) for fault in row.faults):
+            continue
+        place = next(iter(row.places))
+        hit = {row.flown(place, seed, names) for seed in range(len(names))}
+        for world, scene in scenes.items():
+            vehicle = true_vehicle(scene, nominal)
+            tilts = [_tilts(facets, vehicle, scene.errors.rotors, faults) for faults in hit]
+            turning, heading = (max(values) for values in zip(*tilts, strict=True))
+            found.append(Hover(row=row.name, world=world, turning=turning, heading=heading))
+    return found
+
+
+def _tilts(
+    facets: WrenchFacets, vehicle: TrueVehicle, errors: RotorErrors, faults: Sequence[Fault]
+) -> tuple[float, float]:
+    """Least tilt of a hover that may turn, and of one that keeps its heading [deg]."""
+    lower, upper = limits_after(vehicle, 1.0 + errors.gain, faults)
+    weight = vehicle.mass_kg * GRAVITY
+    turning, heading = (
+        least_hover_tilt(facets, weight, lower, upper, centre=vehicle.com_offset_m, hold_yaw=held)
+        for held in (False, True)
+    )
+    return turning, heading
+
+
+def limits_after(vehicle: TrueVehicle, gain: float, faults: Sequence[Fault]) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest true thrust of every rotor under faults [N], (n,) each.
+
+    Args:
+        vehicle: The true vehicle.
+        gain: Mean of true over commanded thrust in its world; the spread over rotors averages out in the lift.
+        faults: Faults of rotors.
+    """
+    lower, upper = (np.array(side, float) for side in (vehicle.thrust_min, vehicle.thrust_max))
+    rotors = SimpleNamespace(
+        vehicle=vehicle, thrust_limits=(lower, upper), gain=gain * np.broadcast_to(vehicle.thrust_gain, lower.shape)
+    )
+    for fault in faults:
+        fault.strike(cast(Any, SimpleNamespace(plant=rotors)), cast(Any, SimpleNamespace()))
+    low, high = rotors.thrust_limits
+    # The plant scales a command and then limits it.
+    return np.clip(rotors.gain * lower, low, high), np.clip(rotors.gain * upper, low, high)
+
+
+def in_words(tilt: float) -> str:
+    """A tilt for the table."""
+    return "none" if math.isinf(tilt) else f"{tilt:.1f}"
+
 
 #: Most failures that are listed for a row at a place.
 LISTED = 3
@@ -163,3 +249,64 @@ def _hovers(hovers: Sequence[Hover], verdicts: Sequence[Verdict]) -> str:
     beyond = {verdict.row.name: verdict.row.beyond for verdict in verdicts if verdict.row.beyond}
     reasons = "".join(f"\n† {name}: {reason}.\n" for name, reason in beyond.items())
     return f"{_ATTAINABLE}\n{markdown(heads, rows, left=range(2))}{reasons}"
+
+
+SCHEMA = 1
+#: Folder of the parts, table of all flights, page, summary.
+PARTS, TABLE, PAGE, SUMMARY = "parts", "faults.parquet", "faults.md", "faults.json"
+
+
+def summary(verdicts: Sequence[Verdict], folder: Path, facts: dict[str, Any]) -> dict[str, Any]:
+    """Content of the summary and of ``--json``.
+
+    Args:
+        verdicts: The rows.
+        folder: Folder of the run.
+        facts: Of the flights: command, version, seed and so on.
+    """
+    flown = [verdict for verdict in verdicts if verdict.flown.n]
+    return {
+        "schema": SCHEMA,
+        "name": "faults",
+        **facts,
+        "run_dir": str(folder),
+        "data_file": str(folder / TABLE),
+        "rows_met": sum(verdict.met for verdict in flown),
+        "rows_flown": len(flown),
+        "proves_nothing": [[verdict.row.name, verdict.place] for verdict in verdicts if verdict.proves_nothing],
+        "rows": [
+            {
+                "fault": verdict.row.name,
+                "place": verdict.place,
+                "met": verdict.met if verdict.flown.n else None,
+                "beyond": verdict.row.beyond or None,
+                "supervised": _entry(verdict.flown),
+                "control": _entry(verdict.control),
+                "control_must_fail": verdict.expected.control_fails,
+            }
+            for verdict in verdicts
+        ],
+    }
+
+
+def _entry(tally: Tally) -> dict[str, Any]:
+    return {
+        "n": tally.n,
+        "passed": tally.passed,
+        **tally.worst,
+        "retreat_s": tally.retreat_s,
+        "states": list(tally.states),
+        "failures": [
+            {"world": world, "seed": seed, "criteria": [criterion.text for criterion in criteria]}
+            for world, seed, criteria in tally.failures
+        ],
+    }
+
+
+def write(folder: Path, table: pl.DataFrame, content: dict[str, Any], text: str) -> Path:
+    """Write table, summary and page; returns the page's file."""
+    write_table(folder / TABLE, table)
+    write_json(folder / SUMMARY, content)
+    file = folder / PAGE
+    file.write_text(text, encoding="utf-8")
+    return file

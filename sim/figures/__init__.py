@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sim.figures.board import draw_board
-from sim.figures.force import draw_force
-from sim.figures.image_error import draw_image_error
-from sim.figures.limits import draw_limits
-from sim.figures.motion import draw_attitude, draw_velocity
-from sim.figures.overview import draw_overview
-from sim.figures.path import draw_path
+from sim.figures.board import draw_board, draw_overview, draw_path
 from sim.figures.style import save, styled
-from sim.figures.thrusts import draw_thrusts
+from sim.figures.time_series import (
+    draw_attitude,
+    draw_force,
+    draw_image_error,
+    draw_limits,
+    draw_thrusts,
+    draw_velocity,
+)
 from sim.flight.trace import Trace
 
 #: Every figure of a run: file name, caption, function.

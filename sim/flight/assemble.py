@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ibvs_qp.command import Outcome
+from ibvs_qp.frames import rotation_rows
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.pilot.painting.strategy import PHASES
-from sim.flight.flight_truth import euler_angles, in_body, rotations
 from sim.flight.options import ticks_in
 from sim.sensors.cameras.protocol import camera_intrinsics
 from sim.world.board import BoardGeometry
@@ -18,6 +18,24 @@ from sim.world.clearance import PropellerClearance
 from sim.world.readout import PLACES
 from sim.world.scene import Scene
 from sim.world.true_vehicle import TrueVehicle, true_vehicle
+
+
+def rotations(attitude: np.ndarray) -> np.ndarray:
+    """Rotation matrices of unit quaternions (w, x, y, z): (N, 4) to (N, 3, 3)."""
+    return np.moveaxis(np.array(rotation_rows(*attitude.T)), 2, 0)
+
+
+def euler_angles(rotation: np.ndarray) -> np.ndarray:
+    """Roll, pitch, yaw [rad] of rotations B to I: (N, 3, 3) to (N, 3)."""
+    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
+    pitch = np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
+    return np.column_stack((roll, pitch, np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])))
+
+
+def in_body(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """World vectors in the body frame, R' v: (N, 3)."""
+    return np.einsum("nji,nj->ni", rotation, vectors)
+
 
 OUTCOMES = tuple(str(outcome) for outcome in Outcome)
 #: Time between logged propeller clearances [s], which change slowly (the plant checks for strikes at every tick).

@@ -9,9 +9,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ibvs_qp.config.files import UnreadableFile
-from sim.flight.log_check import check_arrays
 from sim.flight.trace import PAINTED, Event, Trace
-from sim.flight.unfinished import unfinished_run
+from sim.flight.unfinished import check_arrays, unfinished_run
 from sim.storage.arrays import read_npz
 from sim.storage.atomic import replacing
 from sim.storage.limits import LARGEST_ARRAYS, LARGEST_LOG

@@ -16,11 +16,10 @@ import numpy as np
 from allocation import WrenchFacets, worst_level_reach
 from ibvs_qp.config import ControllerConfig, SafetySettings
 from ibvs_qp.config.errors import ConfigError, out_of_range
-from ibvs_qp.frames import GRAVITY, rotation_from_quaternion
+from ibvs_qp.frames import GRAVITY, rotation_from_quaternion, to_camera
 from ibvs_qp.model.motion_margin import LARGEST_SENSITIVITY, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
-from ibvs_qp.pilot.painting.pattern import PLACE_TOLERANCE_M, ROWS
-from sim.flight.contact_view import STEP_M, ContactView
+from ibvs_qp.pilot.painting.pattern import PLACE_TOLERANCE_M, ROWS, Pattern
 from sim.flight.jobs import Job, PaintJob
 from sim.world.board import BoardGeometry
 from sim.world.clearance import PropellerClearance
@@ -28,6 +27,64 @@ from sim.world.crash import GROUND_CLEARANCE_M
 from sim.world.mjcf import STEP_NS
 from sim.world.scene import ImuScene, Scene
 from sim.world.trim import START_DISTANCE_M, START_DOWN_M, START_RIGHT_M, START_YAW_DEG, facing
+
+#: Spacing of the points at which a line is tested [m]: a pixel is 0.8 mm at 640x480 and 0.5 m.
+STEP_M = 0.001
+
+
+class ContactView:
+    """The picture of the wall plane around the tip, in pattern coordinates relative to it.
+
+    Args:
+        pattern: Directions of the strokes.
+        config: The nominal vehicle of the controller, its bounds of the view, and the shortest line.
+        brush_width_m: Diameter of the brush, which hides the wall [m].
+    """
+
+    def __init__(self, pattern: Pattern, config: PilotConfig, brush_width_m: float) -> None:
+        vehicle, limits = config.controller.vehicle, config.controller.limits
+        tip = to_camera(np.array(vehicle.tip_position_m), np.array(vehicle.camera_position_m))
+        depth = max(float(tip[2]), 0.0)
+        bounds = np.array(((limits.view_left, limits.view_up), (limits.view_right, limits.view_down)))
+        self._low, self._high = bounds * depth - tip[:2]
+        self._axes, self._radius = np.array((pattern.along, pattern.across)), 0.5 * brush_width_m
+        width = vehicle.camera_size_px[0] / vehicle.camera_intrinsics_px[0]
+        self._least = config.vision.detect.min_length * width * depth
+        self._reach = 2.0 * float(np.abs(bounds).max()) * depth
+
+    def shows_parallel(self, aside: float, behind: float, ahead: float) -> bool:
+        """Whether a line along the strokes has a piece in view that is long enough to be found.
+
+        Args:
+            aside: Its v relative to the tip's [m].
+            behind: Its least u relative to the tip's [m].
+            ahead: Its greatest u [m].
+        """
+        along = self._between(behind, ahead)
+        return self._longest(np.column_stack((along, np.full(len(along), aside)))) >= self._least
+
+    def shows_across(self, ahead: float, low: float, high: float) -> bool:
+        """The same of a line across the strokes.
+
+        Args:
+            ahead: Its u relative to the tip's [m].
+            low: Its least v relative to the tip's [m].
+            high: Its greatest v [m].
+        """
+        across = self._between(low, high)
+        return self._longest(np.column_stack((np.full(len(across), ahead), across))) >= self._least
+
+    def _between(self, low: float, high: float) -> np.ndarray:
+        return np.arange(max(low, -self._reach), min(high, self._reach), STEP_M)
+
+    def _longest(self, uv: np.ndarray) -> float:
+        """Length of the longest run of points in view [m]."""
+        places = uv @ self._axes  # (right, down)
+        inside = ((places >= self._low) & (places <= self._high)).all(axis=1)
+        seen = np.concatenate(([0], (inside & (np.hypot(*uv.T) > self._radius)).astype(int), [0]))
+        edges = np.flatnonzero(np.diff(seen))
+        return STEP_M * float(max((edges[1::2] - edges[::2]), default=0))
+
 
 #: Neighbouring strokes come locally up to 7 mm farther apart than nominal (14 pairs of strokes of 0.6 and 0.8 m in the
 #: world datasheet, from the sensor model of lines); this much overlap leaves a little of it [m].

@@ -15,8 +15,7 @@ from ibvs_qp.measurement import SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.pilot.painting.strategy import PHASES
 from sim.flight.assemble import NUMBERS, OUTCOMES, Flown, LoggedRows, assemble, logged_signals
-from sim.flight.columns import Columns
-from sim.flight.journal import CHUNK_S, Header, Journal
+from sim.flight.journal import CHUNK_S, Columns, Header, Journal
 from sim.flight.options import FlightOptions, ticks_in
 from sim.flight.pictures import pack_picture
 from sim.flight.surroundings import World

@@ -15,8 +15,8 @@ from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
 from sim.flight.jobs import Job, PaintJob, PressJob
 from sim.flight.options import FlightOptions
+from sim.storage.arrays import read_json
 from sim.storage.atomic import write_text
-from sim.storage.json_file import read_json
 from sim.world.scene import Scene
 
 SCHEMA = 1

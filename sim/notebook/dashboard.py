@@ -11,11 +11,11 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ibvs_qp.config.vehicle import VehicleParams
-from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.paint_plan import CONTACT_N
 from sim.evaluate.window import tilt_deg
 from sim.figures.style import REFERENCE, note_empty
 from sim.flight.trace import Trace
-from sim.notebook.plots import BLUE, ORANGE, RED
+from sim.notebook.common import BLUE, ORANGE, RED
 from sim.notebook.tuning import Comparison, reach_note
 from sim.notebook.vehicle import Case
 from sim.notebook.wall_flights import HOVER_S

@@ -17,9 +17,7 @@ from sim.flight.closed_loop import fly
 from sim.flight.options import FlightOptions
 from sim.flight.pictures import unpack_picture
 from sim.flight.trace import Trace
-from sim.notebook.plots import RED
-from sim.notebook.short import unless_short
-from sim.notebook.table import table
+from sim.notebook.common import RED, table, unless_short
 from sim.world.scene import Scene
 
 #: Camera pictures shown: phase, and fraction of its duration.

@@ -11,8 +11,7 @@ from ibvs_qp.controller import HybridController
 from sim.evaluate.window import board_tip, phase_window, tilt_deg
 from sim.figures.style import REFERENCE, law_colour, law_name, legend_below, new_figure
 from sim.flight.trace import Trace
-from sim.notebook.internals import Tick, paper_profile, record_tick
-from sim.notebook.plots import (
+from sim.notebook.common import (
     BLUE,
     CONTACT,
     FORCES,
@@ -23,6 +22,7 @@ from sim.notebook.plots import (
     shade,
     wrench_curves,
 )
+from sim.notebook.internals import Tick, paper_profile, record_tick
 from sim.notebook.wall_flights import RecordedFlight
 
 #: Lambda from which a tick counts as full contact, and below which as free flight.

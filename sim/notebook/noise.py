@@ -16,13 +16,11 @@ from sim.experiments.design import Choice, design
 from sim.experiments.spec import experiment
 from sim.flight.closed_loop import fly
 from sim.flight.trace import Trace, law_name
-from sim.notebook.table import table
-from sim.sweep.design import Run
+from sim.notebook.common import table
+from sim.sweep.design import Run, code_hash, configuration_hash
 from sim.sweep.figures.page import read_table
-from sim.sweep.fingerprint import code_hash, configuration_hash
-from sim.sweep.paired import paired_differences, sign
 from sim.sweep.parts import PARAM
-from sim.sweep.statistics import completed, needed, select
+from sim.sweep.statistics import completed, needed, paired_differences, select, sign
 from sim.world.worlds import DEFAULT_WORLD
 
 #: Table that the notebook reads by default, and the spec of its flights for `ibvs-qp experiment`.

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ibvs_qp.config.errors import ConfigError
-from sim.notebook.short import SHORT_VARIABLE
+from sim.notebook.common import SHORT_VARIABLE
 
 #: Folder of the notebooks in a source tree; an installed wheel has none.
 NOTEBOOKS = Path(__file__).parents[2] / "notebooks"

@@ -21,9 +21,8 @@ from ibvs_qp.qp.exact import ExactSolver
 from ibvs_qp.qp.solver import Solver, make_solver
 from sim.bench.qp import DENSE, qpsolvers_problem
 from sim.figures.style import legend_below, new_figure
+from sim.notebook.common import BLUE, GREEN, LIMITED, number, shade, table
 from sim.notebook.internals import Answer, Program, shipped_solver
-from sim.notebook.plots import BLUE, GREEN, LIMITED, shade
-from sim.notebook.table import number, table
 
 #: Ticks that warm a solver up before the measurement.
 WARM_UP = 20

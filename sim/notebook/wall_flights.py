@@ -14,7 +14,7 @@ import ibvs_qp
 from allocation import control_effectiveness
 from ibvs_qp.controller import HybridController
 from ibvs_qp.pilot import PilotConfig
-from sim.evaluate.path_error import CONTACT_N
+from sim.evaluate.paint_plan import CONTACT_N
 from sim.evaluate.window import board_tip, mean, peak, phase_window, rms, tilt_deg
 from sim.experiments.scenes import near_wall
 from sim.experiments.variants import VARIANTS
@@ -22,9 +22,8 @@ from sim.flight.closed_loop import fly, make_pilot
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.surroundings import World
 from sim.flight.trace import Trace
+from sim.notebook.common import number, table, unless_short
 from sim.notebook.internals import Tick, TickRecord, WallJob, record_tick
-from sim.notebook.short import unless_short
-from sim.notebook.table import number, table
 from sim.sweep.setup import Setup
 from sim.world.scene import Scene
 

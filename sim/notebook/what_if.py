@@ -20,7 +20,7 @@ from sim.evaluate.explanation import flown_config
 from sim.evaluate.window import phase_window
 from sim.flight.trace import Trace
 from sim.live.explaining import CEILING, WhatIf, markdown
-from sim.notebook.plots import BLUE, RED
+from sim.notebook.common import BLUE, RED
 from sim.notebook.tuning import save_setting
 from sim.notebook.wall_flights import Setting
 

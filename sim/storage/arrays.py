@@ -1,15 +1,21 @@
-"""Arrays from npy and npz files of unknown origin: plain numbers and text, of the size that the file has."""
+"""Arrays and JSON from files of unknown origin: plain data within the size of the file, or one refusal."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import os
+import threading
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
-from ibvs_qp.config.files import UnreadableFile, open_regular
+from ibvs_qp.config.files import UnreadableFile, open_regular, read_bytes
+from sim.storage.limits import LARGEST_JSON
 
 #: Kinds of elements: boolean, integers, floating point, text; never Python objects.
 _KINDS = "biufU"
@@ -76,3 +82,31 @@ def _array(stream: BinaryIO, largest: int) -> np.ndarray:
 
 def _refusal(file: Path, kind: str, error: Exception) -> UnreadableFile:
     return UnreadableFile(file, f"no {kind} file of plain arrays ({type(error).__name__}: {error})")
+
+
+_one_at_a_time = threading.Lock()
+
+
+@contextlib.contextmanager
+def no_library_output() -> Iterator[None]:
+    """Close standard error for the duration: decoders print a damaged file's warnings, Polars a stack trace."""
+    with _one_at_a_time, open(os.devnull, "wb") as nothing:
+        kept = os.dup(2)
+        os.dup2(nothing.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def read_json(file: Path) -> Any:
+    """Content of a JSON file.
+
+    Raises:
+        UnreadableFile: When it cannot be read or is no JSON; 1000 levels of nesting are none that is read.
+    """
+    try:
+        return json.loads(read_bytes(file, LARGEST_JSON))
+    except (ValueError, RecursionError) as error:
+        raise UnreadableFile(file, f"no JSON ({type(error).__name__}: {error})") from None

@@ -10,8 +10,8 @@ from pathlib import Path
 import polars as pl
 
 from ibvs_qp.config.files import UnreadableFile, open_regular
+from sim.storage.arrays import no_library_output
 from sim.storage.limits import LARGEST_TABLE, MOST_CELLS
-from sim.storage.quiet import no_library_output
 
 #: Decodes the files of its arguments, and prints a line before each: the last one is that which ended it.
 _DECODE = """

@@ -13,11 +13,9 @@ from sim.evaluate.measures import paint_figures, press_row
 from sim.flight.jobs import PressJob
 from sim.flight.options import pilot_config
 from sim.flight.preflight import check_job
-from sim.sweep.axes import fractions
-from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run
-from sim.sweep.fingerprint import code_hash, digest, own_sources
+from sim.sweep.design import Block, FlightPlan, Parameter, Refusal, Run, code_hash, digest, own_sources
 from sim.sweep.setup import changed
-from sim.sweep.spec import SweepSpec, options_of
+from sim.sweep.spec import SweepSpec, fractions, options_of
 from sim.world.board import BoardGeometry
 
 #: Start, approach, alignment and retreat of a flight [s]; sizes the plan only.

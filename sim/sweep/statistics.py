@@ -1,14 +1,15 @@
-"""Statistics of a table of runs: medians with bootstrap intervals per cell."""
+"""Statistics of a table of runs: medians with bootstrap intervals per cell, and a mixed model of law and gains."""
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
-from scipy.stats import bootstrap
+from scipy.stats import bootstrap, quantile_test
 
 from sim.sweep.parts import HEAD, PARAM
 
@@ -113,4 +114,127 @@ def cells(table: pl.DataFrame, of_all: Collection[str] = ()) -> list[dict[str, A
         cell = {name: key[name] for name in ("experiment", "law", "variant")} | {"params": parameters(key)}
         flown = {"n": rows.height, "completed": done.height, "false_claims": false_claims(rows)}
         result.append(cell | flown | {"metrics": metrics, "counts": counts})
+    return result
+
+
+#: Law and gains of a flight by its law and variant; own gains are those of the law.
+CROSSED = {
+    ("qp", "standard"): (-0.5, -0.5),
+    ("qp", "exchanged-gains"): (-0.5, 0.5),
+    ("paper", "shared-gains"): (0.5, -0.5),
+    ("paper", "standard"): (0.5, 0.5),
+}
+
+
+class Ratio(NamedTuple):
+    """A ratio with its 95 % interval by the model."""
+
+    ratio: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """Ratio and interval as text."""
+        return f"{self.ratio:.2f} ({self.low:.2f} to {self.high:.2f})"
+
+
+def law_and_gains(table: pl.DataFrame, metric: str) -> Mapping[str, Ratio]:
+    """Effects of ``law``, ``gains`` and their ``interaction`` on a figure that is above zero.
+
+    Args:
+        table: Flights of the four variants of `CROSSED`.
+        metric: Figure; flights that did not end as planned, or without it, are left out.
+
+    Source: `statsmodels.regression.mixed_linear_model.MixedLM`, restricted maximum likelihood.
+    """
+    import pandas as pd
+    import statsmodels.formula.api as smf
+
+    rows = []
+    for place, (_, cell) in enumerate(split(table, ("experiment",))):
+        for row in cell.filter(pl.col("completed")).iter_rows(named=True):
+            crossed, value = CROSSED.get((row["law"], row["variant"])), row[metric]
+            if crossed is not None and value is not None and value > 0.0:
+                rows.append((place, f"{place}.{row['seed']}", *crossed, np.log(value)))
+    data = pd.DataFrame(rows, columns=["cell", "seed", "law", "gains", "y"])
+    model = smf.mixedlm("y ~ law * gains", data, groups="cell", re_formula="1", vc_formula={"seed": "0 + C(seed)"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a variance at its bound of zero is no fault here
+        fitted = model.fit(reml=True, method="lbfgs")
+    if not fitted.converged:
+        return {name: Ratio(math.nan, math.nan, math.nan) for name in ("law", "gains", "interaction")}
+    ends = fitted.conf_int()
+    names = {"law": "law", "gains": "gains", "interaction": "law:gains"}
+    return {
+        name: Ratio(*(float(np.exp(value)) for value in (fitted.params[term], *ends.loc[term])))
+        for name, term in names.items()
+    }
+
+
+def exact_interval(values: np.ndarray) -> tuple[float, float]:
+    """Interval of the median from order statistics: the inverse of the sign test, valid for any distribution.
+
+    Args:
+        values: Differences; values that are not finite are dropped.
+
+    Returns:
+        Lower and upper end; NaN of fewer than `needed` values.
+    """
+    good = np.asarray(values, float)
+    interval = quantile_test(good[np.isfinite(good)], p=0.5).confidence_interval(CONFIDENCE)
+    return float(interval.low), float(interval.high)
+
+
+def difference(values: np.ndarray) -> dict[str, float]:
+    """Median of differences with its bootstrap interval, ``low`` and ``high``, and its exact one, ``sure_...``."""
+    low, high = exact_interval(values)
+    return {**median_interval(values), "sure_low": low, "sure_high": high}
+
+
+def sign(figure: dict[str, float]) -> int:
+    """+1 or -1 for a significantly positive or negative difference, else 0."""
+    return int(figure["sure_low"] > 0.0) - int(figure["sure_high"] < 0.0)
+
+
+def differences(first: pl.DataFrame, second: pl.DataFrame, names: Sequence[str]) -> dict[str, Any]:
+    """Second minus first, seed by seed, over flights that both ended as planned.
+
+    Args:
+        first: Flights of one cell.
+        second: Flights of another with the same seeds.
+        names: Figures.
+
+    Returns:
+        ``flown`` seeds of both, ``n`` of them ended as planned by both, ``failed`` flights of each, and by figure
+        ``differences``: ``median``, ``low``
+        and ``high`` of the bootstrap, ``pairs``, and ``sure_low`` and ``sure_high`` of the exact interval.
+    """
+    both = first.join(second, on="seed", suffix=".second", maintain_order="left")
+    done = both.filter(pl.col("completed") & pl.col("completed.second"))
+    figures = {}
+    for name in names:
+        values = (done[f"{name}.second"] - done[name]).cast(pl.Float64).fill_null(math.nan).to_numpy()
+        if pairs := int(np.isfinite(values).sum()):
+            figures[name] = {**difference(values), "pairs": pairs}
+    failed = [int((~both[name]).sum()) for name in ("completed", "completed.second")]
+    return {"flown": both.height, "n": done.height, "failed": failed, "differences": figures}
+
+
+def paired_differences(table: pl.DataFrame, names: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """Analytic law minus QP law, seed by seed, per variant and parameters.
+
+    Only flights that both laws ended as planned are compared. A positive difference of an error means that the QP law
+    is better.
+
+    Args:
+        table: Rows of both laws.
+        names: Figures to compare; None takes all.
+    """
+    result = []
+    for key, rows in split(table, ("experiment", "variant")):
+        qp, paper = (rows.filter(pl.col("law") == law) for law in ("qp", "paper"))
+        found = differences(qp, paper, names or figure_names(table))
+        if found["flown"]:
+            cell = {"experiment": key["experiment"], "variant": key["variant"], "params": parameters(key)}
+            result.append(cell | found)
     return result

@@ -11,17 +11,18 @@ import polars as pl
 from sim.sweep import run_sweep
 from sim.sweep.engine import SweepProgress
 from sim.sweep.parts import PARAM
-from sim.tune.choice import (
+from sim.tune.flights import CHOICE_SEED, REPORT_SEED, checks, flights, seeds, training
+from sim.tune.objectives import (
     FINALISTS,
     LEAST_DAMPING,
     SCENE_ROOM,
+    Score,
     allowed,
     contact_damping,
     gain_over,
     ranked,
+    score,
 )
-from sim.tune.flights import CHOICE_SEED, REPORT_SEED, checks, flights, seeds, training
-from sim.tune.objectives import Score, score
 from sim.tune.search import SearchPlan, Trials, start_gains
 from sim.tune.space import Values
 

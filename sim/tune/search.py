@@ -13,9 +13,8 @@ import numpy as np
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.pilot import PilotConfig
 from sim.sweep.flying import fly_run
-from sim.tune.choice import STEEP, contact_damping, cost, less_damped
 from sim.tune.flights import SEARCH_SEED, flights, seeds, training
-from sim.tune.objectives import OBJECTIVES, Score, refused, score
+from sim.tune.objectives import OBJECTIVES, STEEP, Score, contact_damping, cost, less_damped, refused, score
 from sim.tune.space import BY_HAND, RIVAL, Spans, Subject, Values, from_unit, rounded, to_unit
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ def open_study(plan: SearchPlan) -> optuna.Study:
 
 
 def search(plan: SearchPlan, study: optuna.Study, progress: Callable[[int], None]) -> None:
-    """Fly trials until the required number is finished, minimising `sim.tune.choice.cost`.
+    """Fly trials until the required number is finished, minimising `sim.tune.objectives.cost`.
 
     The candidates follow from the seed and the finished trials, so that an interrupted search continues as without the
     interruption.

@@ -12,7 +12,7 @@ from ibvs_qp.config.gains import gain_factors
 from ibvs_qp.config.settings import dump_toml
 from ibvs_qp.model.motion_margin import LAG_RATIOS, LARGEST_SENSITIVITY, LARGEST_WITH_OTHER_LAG, motion_sensitivity
 from ibvs_qp.pilot import PilotConfig
-from sim.rivals.horizon import MpcSettings
+from sim.rivals.prediction import MpcSettings
 
 #: The predictive rival, as a law that is searched.
 RIVAL = "mpc"

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from reach_oracle import LOWER, UPPER, WEIGHT
-from rotor_layouts import OCTOROTOR
+from reach_oracle import LOWER, OCTOROTOR, UPPER, WEIGHT
 
 from allocation import (
     DEFAULT_ROW_WEIGHTS,

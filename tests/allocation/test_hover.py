@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from reach_oracle import FULL, IDLE, LOWER, UPPER, WEIGHT, by_linear_program
-from rotor_layouts import OCTOROTOR
+from reach_oracle import FULL, IDLE, LOWER, OCTOROTOR, UPPER, WEIGHT, by_linear_program
 from scipy.optimize import linprog
 
 from allocation import (

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reach_oracle import DOWN, FULL, IDLE, RIGHT, TIP, UPPER, WEIGHT, by_linear_program
-from rotor_layouts import OCTOROTOR
+from reach_oracle import DOWN, FULL, IDLE, OCTOROTOR, RIGHT, TIP, UPPER, WEIGHT, by_linear_program
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 

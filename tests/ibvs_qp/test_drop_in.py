@@ -1,4 +1,4 @@
-"""The controller as a module to drop in: packages that it loads, and a light installation."""
+"""The controller as a module to drop in: packages that it loads, a light installation, modules by former names."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from ibvs_qp.former_names import MOVED, present_name
 
 ROOT = Path(__file__).parents[2]
 #: The light installation: these, what they need themselves, and nothing else from a package registry.
@@ -66,7 +68,7 @@ def loaded(code: str) -> set[str]:
 @pytest.mark.parametrize("config", ["from ibvs_qp import preset; config = preset().controller", "config = None"])
 def test_the_laws_and_assured_fly_in_a_light_installation(config: str) -> None:
     modules = loaded(LOAD_AND_FLY.replace("CONFIG", config).replace("TICKS", "50"))
-    assert {"osqp", "scipy.sparse", "ibvs_qp.supervision.supervisor"} <= modules
+    assert {"osqp", "scipy.sparse", "ibvs_qp.supervision.supervision"} <= modules
 
 
 def test_a_tick_of_the_laws_loads_no_heavy_part_of_scipy() -> None:
@@ -97,7 +99,7 @@ def test_importing_the_controller_loads_numpy_and_casadi_alone() -> None:
     assert not {name.split(".")[0] for name in modules} & {"scipy", "osqp", "qpsolvers", "jinja2", "tomli_w", "cv2"}
     # Of the own packages only the laws: no painting strategy or pilot, and of vision one matrix.
     parts = {name for name in modules if name.split(".")[0] == "ibvs_qp"}
-    assert not parts & {"ibvs_qp.pilot.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_loss"}
+    assert not parts & {"ibvs_qp.pilot.painting.painter", "ibvs_qp.pilot", "ibvs_qp.supervision.rotor_monitor"}
     assert not any(name.startswith("ibvs_qp.vision") for name in parts)
 
 
@@ -133,3 +135,55 @@ def test_the_readme_snippet_runs() -> None:
     snippet = section.split("```python\n")[1].split("```")[0]
     modules = loaded(HIDE + snippet + "\nassert command.outcome == 'solved'\nprint(' '.join(sorted(sys.modules)))")
     assert "ibvs_qp.controller" in modules and "mujoco" not in modules
+
+
+#: Former public names, and those that `examples` and the documentation once used.
+FORMER = [
+    ("ibvs_qp.adapters.px4", "to_px4"),
+    ("ibvs_qp.adapters.px4_rotors", "from_px4"),
+    ("ibvs_qp.adapters.thrust_curve", "ThrustCurve"),
+    ("ibvs_qp.bridge.config", "BridgeConfig"),
+    ("ibvs_qp.export.library", "write_library"),
+    ("ibvs_qp.painting.config", "PaintingConfig"),
+    ("ibvs_qp.painting.presser", "Presser"),
+    ("ibvs_qp.presets", "preset"),
+    ("ibvs_qp.recording", "read_log"),
+    ("ibvs_qp.ros.bag", "Bag"),
+    ("ibvs_qp.ros.topics", "Topics"),
+    ("ibvs_qp.ros.write_bag", "write_bag"),
+]
+
+
+@pytest.fixture
+def forgotten() -> None:
+    """No module is loaded under a former name."""
+    for name in [name for name in sys.modules if present_name(name)]:
+        del sys.modules[name]
+
+
+@pytest.mark.usefixtures("forgotten")
+@pytest.mark.parametrize(("module", "name"), FORMER)
+def test_a_former_name_is_the_module_of_today(module: str, name: str) -> None:
+    present = str(present_name(module))
+    with pytest.warns(DeprecationWarning) as warnings:
+        found = importlib.import_module(module)
+    assert f"{module} is {present} now" in [str(warning.message) for warning in warnings]
+    assert found is importlib.import_module(present) and hasattr(found, name)
+
+
+def test_every_present_name_exists_and_no_former_one_does() -> None:
+    for present in MOVED.values():
+        assert importlib.import_module(present).__name__ == present
+    assert present_name("ibvs_qp.painting_robot") is None and present_name("ibvs_qp.pilot") is None
+
+
+def test_a_fresh_process_finds_a_nested_former_module_once() -> None:
+    code = (
+        "import warnings; warnings.simplefilter('ignore')\n"
+        "from ibvs_qp.painting.strategy import Strategy\n"
+        "import ibvs_qp, sys\n"
+        "assert Strategy is ibvs_qp.Strategy\n"
+        "assert sys.modules['ibvs_qp.painting.strategy'] is sys.modules['ibvs_qp.pilot.painting.strategy']\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr

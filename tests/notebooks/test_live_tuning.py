@@ -19,8 +19,8 @@ from typing import Any
 import pytest
 import websockets
 
+from sim.notebook.common import SHORT_VARIABLE
 from sim.notebook.render import NOTEBOOKS
-from sim.notebook.short import SHORT_VARIABLE
 
 #: Longest wait for the notebook to be served, or to be idle [s]; steps of a slider that is dragged, and between them.
 PATIENCE_S, STEPS, STEP_S = 400.0, 10, 0.05

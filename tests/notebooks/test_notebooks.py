@@ -14,6 +14,7 @@ from marimo._ast import load
 from marimo._ast.app import InternalApp
 from marimo._convert.ipynb.from_ir import convert_from_ir_to_ipynb
 
+from sim.notebook.common import SHORT_VARIABLE
 from sim.notebook.render import (
     LARGEST_COPY,
     NOTE_ID,
@@ -22,7 +23,6 @@ from sim.notebook.render import (
     notebook_files,
     rendered_file,
 )
-from sim.notebook.short import SHORT_VARIABLE
 
 FILES = notebook_files()
 #: What a copy must not need: marimo's elements, scripts, anything from elsewhere.

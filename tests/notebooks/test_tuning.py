@@ -14,12 +14,20 @@ from ibvs_qp.pilot import PilotConfig
 from sim.commands import cli
 from sim.evaluate.window import tilt_deg
 from sim.figures.style import new_figure
+from sim.notebook.common import DOTS_PER_INCH, RED, SHORT_VARIABLE, picture
 from sim.notebook.dashboard import draw_dashboard
-from sim.notebook.knobs import KNOBS, knob_values, turned
-from sim.notebook.picture import DOTS_PER_INCH, picture
-from sim.notebook.plots import RED
-from sim.notebook.short import SHORT_VARIABLE
-from sim.notebook.tuning import Start, TuningBench, analytic_setting, load_setting, load_start, reach_note, save_setting
+from sim.notebook.tuning import (
+    KNOBS,
+    Start,
+    TuningBench,
+    analytic_setting,
+    knob_values,
+    load_setting,
+    load_start,
+    reach_note,
+    save_setting,
+    turned,
+)
 from sim.notebook.wall_flights import HOVER_S, Setting, flight_figures, fly_setting
 from sim.world.scene import load_scene
 

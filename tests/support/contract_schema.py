@@ -1,9 +1,17 @@
-"""What summary.json must look like, as a checker that names the first thing that is wrong."""
+"""Contract of the commands: summary.json, by a checker that names the first wrong entry, and a refusal in one line."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Any
 
+import pytest
+
+from sim.commands.cli import main
+
+#: Lines of work in progress: kernels may be compiled before a file is opened.
+WORKING = re.compile(r"^.* \.\.\. \(\d+ s\)\n", re.MULTILINE)
 NUMBER = (int, float, type(None))  # non-finite numbers are null
 M_NUMBERS = (
     "duration_s real_time_factor stroke_m path_rms_straight_m path_rms_corner_m path_max_m force_rms_straight_n "
@@ -60,3 +68,12 @@ def check_summary(summary: dict[str, Any], laws: set[str]) -> None:
     assert set(summary["laws"]) == laws
     for metrics in summary["laws"].values():
         check_metrics(metrics)
+
+
+def refusal(words: Sequence[str], captured: pytest.CaptureFixture[str]) -> str:
+    """Message of a refused command: exit code 2, one short line beside those of work, nothing on standard output."""
+    assert main(list(words)) == 2
+    out, err = captured.readouterr()
+    err = WORKING.sub("", err)
+    assert out == "" and err.startswith("ibvs-qp: error: ") and err.count("\n") == 1 and len(err) < 2000, err
+    return err

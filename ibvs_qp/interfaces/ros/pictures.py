@@ -3,15 +3,86 @@
 from __future__ import annotations
 
 import itertools
+import struct
 import sys
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
-from ibvs_qp.interfaces.ros import compressed
 from ibvs_qp.interfaces.ros.messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, BadMessage, header, message, type_of
 from ibvs_qp.vision.picture.settings import DISTORTION_SIZES
+
+#: First bytes of the formats.
+_PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+#: Markers of a JPEG whose segment has the size: start of frame, in all its kinds.
+_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+#: Markers without a segment: fill bytes, TEM and restarts.
+_BARE = frozenset((0xFF, 0x01, *range(0xD0, 0xD9)))
+#: Head of compressedDepth: kind, and the two parameters of the quantised inverse depth.
+_DEPTH_HEAD = struct.Struct("<iff")
+
+
+def colour(message: Any, longest_side: int) -> np.ndarray:
+    """Colour of a compressed picture, uint8 (H, W, 3)."""
+    pixels = _decoded(bytes(message.data), cv2.IMREAD_COLOR, longest_side)
+    # The names of the format are those of the picture before; the plugin compresses blue first, as OpenCV does.
+    return np.ascontiguousarray(pixels[..., ::-1])
+
+
+def depth(message: Any, longest_side: int) -> np.ndarray:
+    """Depth of a compressed picture [m], float32 (H, W), 0 where invalid."""
+    kind, data = message.format.replace(";", " ").split(), bytes(message.data)
+    if "rvl" in kind or "RVL" in kind:
+        raise BadMessage("compressedDepth in RVL is not read: record it with png")
+    head = _DEPTH_HEAD.size if "compressedDepth" in kind else 0
+    pixels = _decoded(data[head:], cv2.IMREAD_UNCHANGED, longest_side)
+    if pixels.dtype != np.uint16 or pixels.ndim != 2:
+        raise BadMessage("compressed depth is no PNG of 16 bits")
+    if "32FC1" not in kind:
+        return pixels.astype(np.float32) * np.float32(1e-3)
+    if head == 0:
+        raise BadMessage("compressed depth in 32FC1 has no parameters")
+    _, a, b = _DEPTH_HEAD.unpack_from(data)
+    with np.errstate(all="ignore"):
+        metres = np.float32(a) / (pixels.astype(np.float32) - np.float32(b))
+    return np.where((pixels > 0) & np.isfinite(metres) & (metres > 0.0), metres, np.float32(0.0))
+
+
+def _decoded(data: bytes, flags: int, longest_side: int) -> np.ndarray:
+    """Pixels of a file in memory whose sides are known to be allowed before it is unpacked."""
+    width, height = _size(data)
+    if not (1 <= width <= longest_side and 1 <= height <= longest_side):
+        raise BadMessage("size out of range")
+    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags | cv2.IMREAD_IGNORE_ORIENTATION if flags > 0 else flags)
+    if pixels is None:
+        raise BadMessage("compressed picture is damaged")
+    return pixels
+
+
+def _size(data: bytes) -> tuple[int, int]:
+    """Width and height by the head of a PNG or JPEG [px]."""
+    try:
+        if data.startswith(_PNG):
+            width, height = struct.unpack_from(">II", data, 16)
+            place = len(_PNG)
+            while data[place + 4 : place + 8] != b"IEND":  # OpenCV reserves memory for any stated length
+                place += 12 + int(struct.unpack_from(">I", data, place)[0])
+            return width, height
+        if data.startswith(_JPEG):
+            place = 2
+            while data[place] == 0xFF:
+                if data[place + 1] in _FRAMES:
+                    height, width = struct.unpack_from(">HH", data, place + 5)
+                    return width, height
+                if data[place + 1] in _BARE:
+                    place += 1 if data[place + 1] == 0xFF else 2
+                    continue
+                place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    except (struct.error, IndexError):
+        raise BadMessage("compressed picture is damaged") from None
+    raise BadMessage("compressed picture is neither JPEG nor PNG")
+
 
 #: Channels of the colour encodings, in the order red, green, blue.
 _RGB, _BGR = (0, 1, 2), (2, 1, 0)
@@ -46,7 +117,7 @@ class Camera(NamedTuple):
 def to_rgb(image: Any) -> np.ndarray:
     """Colour of an ``Image`` or ``CompressedImage``, uint8 (H, W, 3)."""
     if type_of(image) == COMPRESSED_IMAGE:
-        return compressed.colour(image, LONGEST_SIDE)
+        return colour(image, LONGEST_SIDE)
     if image.encoding in _HALF_COLOURS:
         pairs = _rows(image, 2).reshape(image.height, image.width, 2)
         if image.width % 2:
@@ -62,7 +133,7 @@ def to_rgb(image: Any) -> np.ndarray:
 def to_depth(image: Any) -> np.ndarray:
     """Depth of an ``Image`` or ``CompressedImage`` [m], float32 (H, W), 0 where invalid."""
     if type_of(image) == COMPRESSED_IMAGE:
-        return compressed.depth(image, LONGEST_SIDE)
+        return depth(image, LONGEST_SIDE)
     if image.encoding not in _DEPTHS:
         raise BadMessage("encoding is not 16UC1 or 32FC1")
     kind, unit = _DEPTHS[image.encoding]

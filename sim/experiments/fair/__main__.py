@@ -14,7 +14,7 @@ import polars as pl
 from sim.experiments import FAIR
 from sim.experiments.page import Fields, render
 from sim.experiments.spec import experiment
-from sim.sweep.tables import read_tables
+from sim.sweep.parts import read_tables
 
 TEMPLATE, SUMMARY = (Path(__file__).with_name(f"{name}.md.jinja") for name in ("page", "summary"))
 #: Marks of the summary in the README.

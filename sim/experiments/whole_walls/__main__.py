@@ -16,10 +16,9 @@ from sim.evaluate.table import terminal_table
 from sim.experiments.whole_walls.figures import failures, outcomes
 from sim.experiments.whole_walls.flights import SETS, runs_of
 from sim.sweep import run_sweep
-from sim.sweep.fingerprint import listed_block
-from sim.sweep.parts import part_file
+from sim.sweep.design import listed_block
+from sim.sweep.parts import part_file, read_tables
 from sim.sweep.progress import sweep_progress
-from sim.sweep.tables import read_tables
 
 
 def main() -> int:

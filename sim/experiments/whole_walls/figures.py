@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from sim.evaluate.truth import Assessment
-from sim.experiments.criteria import EVERY, Criterion
+from sim.experiments.spec import EVERY, Criterion
 from sim.experiments.verdict import Verdict, evaluate
 from sim.experiments.whole_walls.flights import EARLY_STROKE
 from sim.flight.trace_log import load_trace

@@ -13,11 +13,9 @@ from sim.evaluate.table import markdown
 from sim.figures.style import save, styled
 from sim.flight.trace import law_name
 from sim.storage.atomic import write_text
-from sim.sweep.figures.boxes import draw_boxes
 from sim.sweep.figures.levels import chosen_figures, most_influential, varied
-from sim.sweep.figures.maps import draw_dependence, draw_figure_maps, draw_success_maps
-from sim.sweep.parts import HEAD
-from sim.sweep.tables import read_tables
+from sim.sweep.figures.maps import draw_boxes, draw_dependence, draw_figure_maps, draw_success_maps
+from sim.sweep.parts import HEAD, read_tables
 
 #: Number of parameters in the box plots and in the maps: those with the largest influence.
 MOST_BOXES, MOST_MAPS = 4, 3

@@ -13,8 +13,7 @@ import pytest
 from controller_scenes import measured
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reach_oracle import DOWN, RIGHT, TIP, WEIGHT, by_linear_program
-from rotor_layouts import OCTOROTOR
+from reach_oracle import DOWN, OCTOROTOR, RIGHT, TIP, WEIGHT, by_linear_program
 
 from allocation import TAROT_T960, control_effectiveness, hover_wrench, push_direction, push_reach
 from ibvs_qp.analytic import PaperController

@@ -8,8 +8,7 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from reach_oracle import RIGHT, TIP, WEIGHT
-from rotor_layouts import OCTOROTOR
+from reach_oracle import OCTOROTOR, RIGHT, TIP, WEIGHT
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 from symbolic_block import Block

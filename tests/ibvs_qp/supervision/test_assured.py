@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from controller_scenes import FLOOR, TICK_NS, line_references
-from hostile_values import Raising
+from hostile import Raising
 from references import good_reference
 from small_vehicle import SmallVehicle
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ibvs_qp.command import SafetyState
 from ibvs_qp.supervision.faults import POLICY, Fault, Rule
-from ibvs_qp.supervision.supervisor import Supervisor
+from ibvs_qp.supervision.supervision import Supervisor
 
 NOMINAL, DEGRADED, RETREAT, HOVER, DESCEND, TERMINATED = SafetyState
 SEVERITY = {state: index for index, state in enumerate(SafetyState)}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from controller_scenes import CEILING, FLOOR, TICK_NS, line_references, measured
-from hostile_values import Raising
+from hostile import Raising
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from references import good_reference

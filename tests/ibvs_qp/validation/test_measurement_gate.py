@@ -12,8 +12,7 @@ from controller_scenes import TICK_NS, line_references, measured
 from references import good_reference
 
 from ibvs_qp.measurement import LineFeature
-from ibvs_qp.validation.measurement import MeasurementGate
-from ibvs_qp.validation.reference import ReferenceGate
+from ibvs_qp.validation.measurement import MeasurementGate, ReferenceGate
 
 FIRST, SECOND = np.arange(6.0), np.arange(6.0) + 10.0
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ibvs_qp.validation.self_check import SelfCheck
-from ibvs_qp.validation.turn_check import TurnCheck
+from ibvs_qp.validation.self_check import SelfCheck, TurnCheck
 
 DT = 0.004
 #: From front-left-up to front-right-down and back, and from NED to ENU.

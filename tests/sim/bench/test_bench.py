@@ -1,4 +1,4 @@
-"""`ibvs-qp bench vision`: rows, ratios, rejected options and folders."""
+"""`ibvs-qp bench` vision, qp and loop: rows, counts, ratios, rejected options and folders."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ import pytest
 from ibvs_qp.config.errors import IbvsQpError
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import checks
-from sim.bench.mission import mission_shots
+from sim.bench import loop
+from sim.bench.ticks import recorded_ticks
 from sim.bench.timing import DEADLINES_HZ, Row
-from sim.bench.vision import bench_vision
+from sim.bench.vision import bench_vision, mission_shots
 from sim.commands.cli import main
 from sim.world.scene import Scene
 
@@ -100,3 +101,63 @@ def test_an_unusable_option_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["bench", "vision", "--real", str(tmp_path)]) == 2
     assert "manifest.csv: No such file" in capsys.readouterr().err
     assert main(["bench"]) == 2
+
+
+def test_stages_of_both_flights_add_up(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    monkeypatch.setattr(loop, "LONGEST_FLIGHT", 400)
+    assert main(["bench", "loop", "--json"]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    bench = json.loads(line)
+    assert bench["schema"] == 1 and set(bench) == {"schema", "rows", "stages_us", "ratios"}
+    stages = bench["stages_us"]
+    assert set(stages) == {f"{flight}_{stage}" for flight in ("rendered", "geometric") for stage in loop.STAGES}
+    assert {row["name"] for row in bench["rows"]} == set(stages)
+    for flight in ("rendered", "geometric"):
+        spent = [stages[f"{flight}_{stage}"] for stage in loop.STAGES]
+        assert bench["ratios"][f"{flight}_real_time"] == pytest.approx(1e6 / sum(spent))
+    assert stages["geometric_drawing"] == stages["geometric_vision"] == 0.0
+    assert all(spent > 0.0 for name, spent in stages.items() if name.startswith("rendered"))
+
+
+def test_the_table_names_every_stage(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    monkeypatch.setattr(loop, "LONGEST_FLIGHT", 300)
+    assert main(["bench", "loop"]) == 0
+    out = capsys.readouterr().out
+    assert all(stage in out for stage in loop.STAGES) and "real-time factor" in out
+
+
+def test_ticks_are_those_of_a_flight() -> None:
+    ticks = recorded_ticks(1500, seed=0)
+    stamps = np.array([measurement.stamp_ns for measurement, _ in ticks])
+    assert len(ticks) == 1500 and (np.diff(stamps) == 4_000_000).all()
+    assert any(measurement.lines for measurement, _ in ticks)
+
+
+def test_bench_qp_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "qp", "--ticks", "1200", "--sample", "60", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    rows = {row["name"]: row for row in table["rows"]}
+    assert table["schema"] == 1 and {
+        "step",
+        "step_interpreted",
+        "qpsolvers_osqp",
+        "qpsolvers_assembly",
+        "casadi_daqp",
+    } <= set(rows)
+    assert set(rows["step"]) == {"name", "size", "p50_us", "p90_us", "p99_us", "p999_us", "max_us", "misses"}
+    assert set(table["stages_us"]) == {"pack", "evaluate", "solve", "explain"}
+    assert table["ratios"]["qpsolvers_osqp"] > 1.0
+    assert rows["qpsolvers_assembly"]["p50_us"] < rows["qpsolvers_osqp"]["p50_us"]
+    kinds = [*table["row_kinds"], "step_interpreted", "mink_12_joints"]
+    assert all(any(name == kind or name.startswith(kind.removesuffix("NAME")) for kind in kinds) for name in rows)
+    assert sum(table["outcomes"].values()) == table["ticks"] == 1200
+    assert table["osqp_iterates_share"] == 1.0 and "0" not in table["iterations"]
+    assert table["difference_to_exact_n"]["max"] < 2e-2
+    assert table["difference_to_exact_unlimited_n"]["max"] < 1e-3
+
+
+@pytest.mark.parametrize("words", [["--ticks", "5"], ["--sample", "0"]])
+def test_bench_qp_refuses_nonsense_in_one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "qp", *words]) == 2
+    said = capsys.readouterr().err
+    assert words[0] in said and said.count("\n") == 1

@@ -6,6 +6,7 @@ import dataclasses
 import importlib
 import json
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from contract_schema import M_NUMBERS, check_metrics
 from synthetic_trace import synthetic_trace
 
+from sim.commands.cli import main
 from sim.evaluate.figures import FIGURES
 from sim.evaluate.metrics import compute_metrics
 from sim.report.rundir import as_json
@@ -122,3 +124,18 @@ def test_example_of_the_readme_runs():
     exec(compile(block, "README.md", "exec"), names)
     assert names["command"].outcome == "solved"
     assert names["command"].rejected == ()
+
+
+def test_the_printed_command_is_one_that_a_shell_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in (
+        "ibvs_qp.interfaces.c_library.library.write_library",
+        "ibvs_qp.interfaces.c_library.recorded.write_recorded",
+    ):
+        monkeypatch.setattr(name, lambda *_: None)
+    monkeypatch.setattr("sim.bench.ticks.press_flight", lambda *_: [])
+    folder = tmp_path / "my lib's; controller"
+    assert main(["export-c", str(folder)]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "make" in line)
+    assert shlex.split(line.partition(": ")[2]) == ["make", "-C", str(folder), "test"]

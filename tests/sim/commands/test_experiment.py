@@ -8,12 +8,14 @@ from itertools import accumulate
 import numpy as np
 import polars as pl
 import pytest
+from contract_schema import refusal
 from press_trace import press_trace
 from synthetic_trace import Errors, synthetic_trace
 
 import ibvs_qp
 import sim.sweep.flying
 from ibvs_qp.config.contact_margin import contact_mode_damping
+from ibvs_qp.pilot.presets import FOLDER
 from sim.commands.cli import main
 from sim.experiments.design import Choice, designs
 from sim.experiments.variants import VARIANTS, with_force_gain
@@ -102,9 +104,7 @@ def test_interrupt_keeps_what_was_flown_and_says_how_to_go_on(flown, monkeypatch
     ],
 )
 def test_refusals_are_one_line(flown, capsys, words, named):
-    assert main(words) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and named in err and err.startswith("ibvs-qp: error: ")
+    assert named in refusal(words, capsys)
     assert not flown
 
 
@@ -120,7 +120,6 @@ def same(one, other):
 @pytest.mark.slow
 def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path, capsys):
     words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
-    monkeypatch.setattr("sim.sweep.again.outcome", sim.sweep.flying.outcome)
     main([*words, "--traces"])
     count, content = len(flown), json.loads(capsys.readouterr().out)
     main([*words, "--again"])
@@ -136,7 +135,6 @@ def test_figures_are_computed_again_from_the_traces(flown, monkeypatch, tmp_path
 
 
 def test_traces_of_another_configuration_are_flown_anew(flown, monkeypatch):
-    monkeypatch.setattr("sim.sweep.again.outcome", sim.sweep.flying.outcome)
     words = ["experiment", "approach", "--quick", "--jobs", "1", "--json", "--out", "run"]
     main([*words, "--traces"])
     count = len(flown)
@@ -213,3 +211,72 @@ def test_gain_and_delay_take_damping_and_impedance_gives_it():
     assert predicted_damping("qp", "standard", 2.0, 1500.0, 0.048) < predicted_damping(
         "qp", "standard", 2.0, 1500.0, 0.004
     )
+
+
+PAIR = [str(FOLDER / "tarot_t960_qp.toml"), str(FOLDER / "tarot_t960_paper.toml")]
+SHORT = ["--quick", "--features", "geometric", "--seeds", "1", "--jobs", "1", "--json"]
+
+
+@pytest.fixture
+def flights(monkeypatch, tmp_path):
+    """Flights are synthetic and counted."""
+    flights: list[str] = []
+
+    def fly(scene, options, *, config, job, faults):
+        flights.append(options.law)
+        return synthetic_trace(Errors(push_error_n=0.1), scene, options.law, options.seed)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    monkeypatch.chdir(tmp_path)
+    return flights
+
+
+@pytest.mark.slow
+def test_two_presets_fly_the_same_short_job(tmp_path, capsys):
+    assert main(["compare", *PAIR, *SHORT, "--out", str(tmp_path / "run")]) == 0
+    content = json.loads(capsys.readouterr().out)
+    (cell,) = content["cells"]
+    assert (cell["law"], cell["n"], cell["completed"]) == ("own", 1, [1, 1])
+    path = cell["differences"]["path_rms_m"]
+    assert 0.0 < path["a"] < 0.01 and 0.0 < path["b"] < 0.01 and path["a"] != path["b"]
+    assert content["run_dir"] == str(tmp_path / "run") and not content["interrupted"]
+
+
+def test_presets_fly_the_law_that_they_name(flights, capsys):
+    assert main(["compare", *PAIR, *SHORT]) == 0
+    assert flights == ["qp", "paper"]
+    assert json.loads(capsys.readouterr().out)["cells"][0]["n"] == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ([*PAIR, "--seeds", "0"], "--seeds"),
+        ([*PAIR, "--jobs", "0"], "--jobs"),
+        ([PAIR[0], "."], "is a file and . a folder"),
+        ([PAIR[0], "nowhere.toml"], "nowhere.toml does not exist"),
+    ],
+)
+def test_refusals_are_one_line_and_fly_nothing(flights, capsys, words, named):
+    assert named in refusal(["compare", *words], capsys)
+    assert not flights
+
+
+@pytest.mark.parametrize("done", [0, 1])
+def test_interrupt_names_the_folder_and_goes_on(flights, monkeypatch, capsys, done):
+    whole = sim.sweep.flying.fly
+
+    def fly(*arguments, **named):
+        if len(flights) == done:
+            raise KeyboardInterrupt
+        return whole(*arguments, **named)
+
+    monkeypatch.setattr(sim.sweep.flying, "fly", fly)
+    assert main(["compare", *PAIR, *SHORT, "--out", "run"]) == 130
+    out, err = capsys.readouterr()
+    content = json.loads(out)
+    assert content["interrupted"] and content["cells"] == []
+    assert "finished flights are in" in err and "go on with: ibvs-qp compare" in err and "--out run" in err
+    monkeypatch.setattr(sim.sweep.flying, "fly", whole)
+    assert main(["compare", *PAIR, *SHORT, "--out", "run"]) == 0
+    assert len(flights) == 2

@@ -20,7 +20,7 @@ from sim.commands import bench, compare, experiment, faults
 from sim.commands.cli import main
 from sim.detection.report import frame_table
 from sim.evaluate import explanation_text
-from sim.evaluate.flight_table import LINES, figure_table
+from sim.evaluate.metrics import LINES, figure_table
 from sim.evaluate.table import terminal_table
 
 WIDTH = 80

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import math
 
 import numpy as np
 import pytest
+from rich.console import Console
 from synthetic_trace import PHYSICS_PER_TICK, TOUCH_S, Errors, synthetic_trace
 
-from sim.evaluate.metrics import compute_metrics
+from sim.evaluate.metrics import LINES, compute_metrics, figure_table
 from sim.evaluate.paint_plan import band_mask, distance_to_polyline, nominal_plan, plan_as_painted
 from sim.world.board import BoardGeometry
 from sim.world.scene import BoardScene, PaintScene, Scene
@@ -192,3 +194,23 @@ def test_canvas_starts_at_the_top_left():
     # The row runs from 0.05 m to 0.55 m, 0.05 m above the bottom edge: rows 510..590 of 600.
     assert mask[549, 300] and mask[511, 300] and mask[588, 300] and mask[549, 12] and mask[549, 588]
     assert not mask[508, 300] and not mask[592, 300] and not mask[549, 592] and not mask[:500].any()
+
+
+@pytest.mark.parametrize("laws", [("qp",), ("qp", "paper")])
+def test_the_table_fits_80_columns_and_cuts_no_number(laws):
+    scene = Scene(paint=PaintScene(rows=4))
+    metrics = {law: compute_metrics(synthetic_trace(Errors(row_offset_m=(0.01, -0.05, 0.03, -0.06)), scene, law))
+               for law in laws}  # fmt: skip
+    for figures in metrics.values():
+        figures |= {"first_touch_s": 12345.678, "force_peak_n": -1234567.891, "reason": "supercalifragilistic" * 4}
+    Console(file=(text := io.StringIO()), width=80).print(figure_table(metrics))
+    lines = text.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80 and "…" not in text.getvalue()
+    words = text.getvalue().split()
+    for figure in LINES:
+        for figures in metrics.values():
+            shown = figure.show(figures)
+            if any(map(str.isdigit, shown)) and " " not in shown:
+                assert shown in words or figure.name == "reason", figure.name
+        assert set(figure.words.split()) <= set(words), figure.words
+    assert "CLAIM)" in words and "row 3" in " ".join(words)

@@ -10,8 +10,7 @@ import pytest
 from press_trace import press_trace
 from synthetic_trace import Errors, synthetic_trace
 
-from sim.evaluate.flight_table import false_claims
-from sim.evaluate.metrics import compute_metrics
+from sim.evaluate.metrics import compute_metrics, false_claims
 from sim.evaluate.strokes import painted_strokes
 from sim.evaluate.truth import Assessment
 from sim.flight.trace import INTERRUPTED, KILLED, Event, Trace

@@ -16,8 +16,8 @@ from sim.experiments.fair.__main__ import page, put_into
 from sim.experiments.page import QP, Fields
 from sim.experiments.spec import experiment
 from sim.rivals import MPC
-from sim.sweep.mixed import CROSSED, law_and_gains
-from sim.sweep.tables import read_tables
+from sim.sweep.parts import read_tables
+from sim.sweep.statistics import CROSSED, law_and_gains
 
 ROOT = Path(__file__).parents[3]
 

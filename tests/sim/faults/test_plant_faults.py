@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from plants import at_rest
 
-from sim.evaluate.measures.loss import loss_figures
+from sim.evaluate.measures import loss_figures
 from sim.experiments.scenes import near_wall
 from sim.faults.air import SidePush, WindStep
 from sim.faults.rotors import Derate, RotorStuck, ThrustLoss

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from closed_loop_rigs import short_scene
-from rotor_layouts import OCTOROTOR
+from reach_oracle import OCTOROTOR
 from scipy.linalg import null_space
 from scipy.optimize import linprog
 from small_vehicle import SmallVehicle

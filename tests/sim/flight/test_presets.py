@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from closed_loop_rigs import short_scene
-from rotor_layouts import OCTOROTOR
+from reach_oracle import OCTOROTOR
 
 import ibvs_qp
 from allocation import TAROT_T960, Rotor, RotorGeometry

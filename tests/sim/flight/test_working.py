@@ -10,8 +10,7 @@ import pytest
 from rich.console import Console
 
 import sim.flight.working
-from sim.flight.progress import flight_progress
-from sim.flight.working import working, write
+from sim.flight.working import flight_progress, working, write
 from sim.sweep.progress import sweep_progress
 from sim.world.scene import Scene
 
@@ -110,7 +109,7 @@ def test_the_line_of_other_work_follows_it(state: Callable[[], str]) -> None:
 
 def test_a_terminal_gets_no_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sim.flight.working, "lines", None)
-    monkeypatch.setattr("sim.flight.progress.lines", None)
+    monkeypatch.setattr("sim.flight.working.lines", None)
     monkeypatch.setattr("sim.sweep.progress.lines", None)
     console = Console(file=io.StringIO(), force_terminal=True)
     with working(console, "Drawing"), sweep_progress(console, "x") as update:

@@ -15,7 +15,7 @@ from ibvs_qp.controller import default_limits, qp_problem
 from sim.evaluate.figures import FIGURES as FIGURES_OF_MERIT
 from sim.evaluate.metrics import compute_metrics
 from sim.figures import FIGURES, draw_all
-from sim.report import wording
+from sim.report import report as wording
 from sim.report.report import write_report
 from sim.report.rundir import RunFolder, summary
 from sim.world.scene import PaintScene, Scene

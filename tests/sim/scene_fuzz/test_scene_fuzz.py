@@ -9,8 +9,7 @@ from sim.flight.options import FlightOptions
 from sim.flight.preflight import job_problems
 from sim.scene_fuzz import __main__ as command
 from sim.scene_fuzz import check
-from sim.scene_fuzz.check import BAD, check_draw, check_file
-from sim.scene_fuzz.draw import FEWEST, MOST, drawn_scene, scene_keys
+from sim.scene_fuzz.check import BAD, FEWEST, MOST, check_draw, check_file, drawn_scene, scene_keys
 from sim.world.scene import Scene, load_scene
 
 OPTIONS = FlightOptions(features="geometric", video=False, compiled=True)

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -17,9 +24,8 @@ from sim.flight.jobs import PressJob
 from sim.flight.options import FlightOptions, pilot_config
 from sim.flight.trace_log import load_trace
 from sim.sweep import FlightPlan, Run, run_sweep
-from sim.sweep.fingerprint import configuration_hash
-from sim.sweep.paired import paired_differences
-from sim.sweep.statistics import cells, false_claims
+from sim.sweep.design import configuration_hash
+from sim.sweep.statistics import cells, false_claims, paired_differences
 
 
 def made_up(seed=0, law="qp", friction=0.3, **changes) -> Run:
@@ -75,7 +81,7 @@ def test_a_changed_setting_is_flown_anew(flown, tmp_path):
 
 def test_changed_flight_code_is_flown_anew(flown, tmp_path, monkeypatch):
     run_sweep([made_up(1)], tmp_path)
-    monkeypatch.setattr("sim.sweep.fingerprint.code_hash", lambda: "other code")
+    monkeypatch.setattr("sim.sweep.design.code_hash", lambda: "other code")
     run_sweep([made_up(1)], tmp_path)
     assert flown == [1, 1]
 
@@ -164,3 +170,49 @@ def test_a_part_appears_whole_or_not_at_all(flown, tmp_path, monkeypatch):
         run_sweep([made_up(0)], tmp_path)
     monkeypatch.undo()
     assert not list(tmp_path.glob("part-*.parquet"))
+
+
+_PROGRAM = """
+import sys
+import sim.commands.experiment
+import dataclasses
+import sim.experiments.design as experiments
+approach = experiments.experiment("approach")
+short = dataclasses.replace(approach, fixed={"job.hold_s": 0.5})
+experiments.experiment = lambda name: short
+from sim.commands.cli import main
+sys.exit(main())
+"""
+
+
+def start(out: Path) -> subprocess.Popen[bytes]:
+    words = ["experiment", "approach", "--features", "geometric", "--json", "--jobs", "2", "--out", str(out)]
+    program = [sys.executable, "-c", _PROGRAM, *words]
+    return subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("group", [False, True], ids=["parent alone", "whole group, as a terminal does"])
+def test_ctrl_c_keeps_finished_flights(tmp_path, group):
+    process = start(tmp_path)
+    while len(list(tmp_path.glob("parts/part-*.parquet"))) < 2 and process.poll() is None:
+        time.sleep(0.2)
+    (os.killpg if group else os.kill)(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err.decode()
+    content = json.loads(out)
+    parts = list(tmp_path.glob("parts/part-*.parquet"))
+    assert content["interrupted"] is True
+    assert sum(cell["n"] for cell in content["cells"]) == len(parts) >= 2
+    assert b"Traceback" not in err and b"go on with" in err
+    assert _gone(process.pid)
+
+
+def _gone(session: int) -> bool:
+    """Whether every process of the session ends within a few seconds."""
+    for _ in range(100):
+        alive = subprocess.run(["ps", "-o", "pid=", "-g", str(session)], capture_output=True, text=True).stdout.split()
+        if not alive:
+            return True
+        time.sleep(0.2)
+    return False

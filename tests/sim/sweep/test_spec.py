@@ -14,10 +14,9 @@ import pytest
 import sim
 from ibvs_qp.config.errors import ConfigError
 from sim.sweep import Planned, Run, load_spec
-from sim.sweep.axes import fractions
 from sim.sweep.design import Refusal
 from sim.sweep.setup import Setup, changed, unit_of, value_at
-from sim.sweep.spec import parse_spec
+from sim.sweep.spec import fractions, parse_spec
 
 SPECS = sorted((Path(next(iter(sim.__path__))) / "sweep" / "specs").glob("*.toml"))
 GRID = """

@@ -11,14 +11,12 @@ import pytest
 
 from ibvs_qp.config.errors import ConfigError
 from sim.experiments import NAMES
-from sim.experiments.criteria import EVERY, Criterion
 from sim.experiments.design import Choice, designs
-from sim.experiments.spec import experiment
+from sim.experiments.spec import EVERY, Criterion, experiment
 from sim.experiments.verdict import evaluate
 from sim.report.comparison import compare, read_run
-from sim.sweep.paired import exact_interval, paired_differences, sign
 from sim.sweep.parts import frame, write_table
-from sim.sweep.statistics import cells, median_interval, needed, spread
+from sim.sweep.statistics import cells, exact_interval, median_interval, needed, paired_differences, sign, spread
 
 
 def table(values: dict[str, list[float]], name: str = "error", **params: float) -> pl.DataFrame:

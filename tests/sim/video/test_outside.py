@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from synthetic_trace import synthetic_trace
 
 from sim.video.outside import OutsideView, flown_vehicle, scene_points, vehicle_pose
-from sim.video.outside_camera import OutsideCamera
-from sim.video.rasterizer import OVERSAMPLING, Rasterizer
-from sim.video.triangles import Triangles
+from sim.video.rasterizer import OVERSAMPLING, OutsideCamera, Rasterizer, Triangles
 from sim.world.board import BoardGeometry
 from sim.world.mjcf import build_model
 from sim.world.mujoco_frames import FLIP

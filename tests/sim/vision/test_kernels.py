@@ -20,7 +20,7 @@ from ibvs_qp.vision.compilation import KERNELS, prepare
 from ibvs_qp.vision.paper import PaperConfig, PaperPerception
 from ibvs_qp.vision.picture.camera import RgbdCamera
 from ibvs_qp.vision.picture.settings import RgbdCameraSettings
-from sim.bench.mission import mission_shots
+from sim.bench.vision import mission_shots
 
 
 def _signatures() -> dict[str, int]:

@@ -11,7 +11,7 @@ from row_2_scene import attitude_of, row_2_scene
 
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.vision import LineHint, Perception, VisionConfig
-from sim.bench.mission import mission_shots
+from sim.bench.vision import mission_shots
 from sim.world.scene import Scene
 from tests.support.truth import render_frame
 from tests.support.truth.accuracy import line_errors

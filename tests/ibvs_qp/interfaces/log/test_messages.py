@@ -1,19 +1,27 @@
-"""What is read back is bit-identical to what was written, whatever it is."""
+"""Messages of a log are read back bit-identical; types and topics are those of viewers."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import make_reader
+from recorded_flights import logged, record
 from references import good_reference
 
 from ibvs_qp import LineFeature, LineReference, Measurement, PaperController, Reference
 from ibvs_qp.estimation.contact_state import ContactState
+from ibvs_qp.interfaces.log import FOXGLOVE_LAYOUT
 from ibvs_qp.interfaces.log.messages import Malformed, decode, encode, message_class
 from ibvs_qp.interfaces.log.topics import STEP, ControllerInput
 
@@ -109,3 +117,64 @@ def test_an_input_that_is_no_measurement_returns() -> None:
     assert returned(given).measurement == "none"
     stranger = ControllerInput(tick=0, call=STEP, measurement=object())  # type: ignore[arg-type]
     assert returned(stranger).measurement.text == "object"
+
+
+#: Topics of simulated flights alone, and the fields of them that the layout plots.
+TRUTH = re.compile(r"/truth/(vehicle|board|pose|state\.push_n)$")
+TICKS = 1300
+FOXGLOVE = {
+    "/camera/image": "CompressedImage",
+    "/camera/calibration": "CameraCalibration",
+    "/camera/detections": "ImageAnnotations",
+    "/camera/depth": "RawImage",
+    "/camera/depth_calibration": "CameraCalibration",
+    "/camera/overlay": "CompressedImage",
+    "/tf": "FrameTransforms",
+    "/vehicle/pose": "PoseInFrame",
+    "/vehicle/shape": "SceneUpdate",
+    "/vehicle/points": "PointCloud",
+    "/vehicle/forces": "SceneUpdate",
+    "/wall/shape": "SceneUpdate",
+    "/wall/points": "PointCloud",
+    "/log": "Log",
+}
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("log") / "a.mcap"
+    record(file, "paint_qp", "pilot", TICKS)
+    return file
+
+
+def strings(value: Any) -> Iterator[str]:
+    if isinstance(value, dict | list):
+        for each in (*value, *(value.values() if isinstance(value, dict) else ())):
+            yield from strings(each)
+    elif isinstance(value, str):
+        yield value
+
+
+@pytest.mark.slow
+def test_topics_and_fields_are_those_of_viewers_and_layout(log: Path) -> None:
+    messages = logged(log)
+    counts, latest = Counter(topic for topic, _ in messages), dict(messages)
+    assert counts["/control"] == counts["/controller/input"] == counts["/sensors"] == TICKS
+    kinds = {topic: content.DESCRIPTOR.full_name for topic, content in latest.items()}
+    assert {topic: f"foxglove.{kind}" for topic, kind in FOXGLOVE.items()}.items() <= kinds.items()
+    assert latest["/camera/image"].data[:2] == b"\xff\xd8"
+    with open(log, "rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None and {chunk.compression for chunk in summary.chunk_indexes} == {""}
+    layout = json.loads(FOXGLOVE_LAYOUT.read_text(encoding="utf-8"))
+    named = [text for text in strings(layout["configById"]) if text.startswith("/")]
+    assert len(named) > 25
+    for text in named:
+        if not TRUTH.match(text):
+            topic, *path = text.split(".")
+            kind = latest[topic].DESCRIPTOR
+            for part in path:  # such as command.thrusts[0]
+                field = kind.fields_by_name[part.split("[")[0]]
+                assert ("[" in part) == field.is_repeated, text
+                kind = field.message_type or kind
+    assert sorted(text for text in strings(layout["layout"]) if "!" in text) == sorted(layout["configById"])

@@ -13,9 +13,8 @@ from dds_queues import NOW, Queue, attitude, camera_info, color, combined, depth
 
 import ibvs_qp.interfaces.px4.bridge as module
 from ibvs_qp import Pilot, PilotConfig, SafetyState, preset
-from ibvs_qp.interfaces.px4.bridge import Bridge
+from ibvs_qp.interfaces.px4.bridge import Bridge, BridgeState
 from ibvs_qp.interfaces.px4.config import BridgeConfig
-from ibvs_qp.interfaces.px4.gate import BridgeState
 from ibvs_qp.interfaces.px4.inputs import MODE, subscriptions
 
 TICK = 4_000_000

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
-from ibvs_qp.interfaces.px4.gate import BridgeState, Gate
+from ibvs_qp.interfaces.px4.bridge import BridgeState, Gate
 
 TICK = 4_000_000
 WAITING, CHECKING, READY, FLYING, STOPPED = BridgeState

@@ -16,8 +16,8 @@ from ibvs_qp.config import VehicleParams
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.interfaces.px4.config import BridgeConfig
 from ibvs_qp.interfaces.ros import samples
-from ibvs_qp.interfaces.ros.attitude_filter import AttitudeFilter
 from ibvs_qp.interfaces.ros.bag import Bag
+from ibvs_qp.interfaces.ros.latest_samples import AttitudeFilter
 from ibvs_qp.interfaces.ros.messages import IMU, WRENCH, BadMessage, header, message
 from ibvs_qp.interfaces.ros.static_poses import TF, StaticPoses, differences
 from ibvs_qp.interfaces.ros.topics import Px4Topics, Topics

@@ -11,7 +11,6 @@ import pytest
 
 pytest.importorskip("rosbags", reason="needs the extra ros")
 
-from ibvs_qp.interfaces.ros import compressed as compressed_module
 from ibvs_qp.interfaces.ros import pictures
 from ibvs_qp.interfaces.ros.latest_samples import CLOCK_SET_NS, MOST_WAITING, WAITING_NS, LatestSamples
 from ibvs_qp.interfaces.ros.messages import COMPRESSED_IMAGE, BadMessage, header, message
@@ -182,4 +181,4 @@ def test_a_jpeg_cannot_hide_its_size_behind_a_marker_without_a_segment() -> None
     for marker in (b"\xff\x01", b"\xff\xd0", b"\xff\xff"):
         hidden = large[:2] + marker + struct.pack(">H", len(fake) + 2) + fake + large[2:]
         with pytest.raises(BadMessage):
-            compressed_module.colour(compressed("jpeg", hidden), 512)
+            pictures.colour(compressed("jpeg", hidden), 512)

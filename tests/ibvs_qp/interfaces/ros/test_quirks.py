@@ -20,7 +20,7 @@ from mcap.reader import NonSeekingReader
 from mcap.writer import CompressionType, IndexType, Writer
 from ruamel.yaml import YAML
 
-from ibvs_qp.interfaces.ros import compressed, samples
+from ibvs_qp.interfaces.ros import pictures, samples
 from ibvs_qp.interfaces.ros.bag import Bag
 from ibvs_qp.interfaces.ros.messages import (
     COMPRESSED_IMAGE,
@@ -206,7 +206,7 @@ def test_fuzzed_heads_of_compressed_pictures_neither_crash_nor_unpack_much() -> 
             data[place] = int(rng.integers(256))
         value = message(COMPRESSED_IMAGE, header=header(1, ""), format=kind, data=np.frombuffer(bytes(data), np.uint8))
         try:
-            found = (compressed.depth if "Depth" in kind else compressed.colour)(value, 256)
+            found = (pictures.depth if "Depth" in kind else pictures.colour)(value, 256)
         except BadMessage:
             continue
         assert found.nbytes <= 256 * 256 * 4
