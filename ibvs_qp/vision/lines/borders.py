@@ -41,7 +41,7 @@ _FULL_SHARE = 0.2
 _UNSEEN, _ON, _FARTHER, _NEARER = 0, 1, 2, 3
 #: Distances within which the surface must be seen on its own side, beyond which it must not be, and within which it
 #: goes on, as places in the list of distances.
-_SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM = 5, 5, 1, 4, 2
+_SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM, _HELD_TO = 5, 5, 1, 4, 2, 2
 #: Colours on both sides nearer than this are one; next to the bare surface, a continuation is as near to it [grey
 #: levels].
 _CONTRAST, _SAME_COLOR = 16.0, 24.0
@@ -69,6 +69,12 @@ class Borders:
     depth: np.ndarray  # 0..1, fraction of the line along which the surface ends by depth, (n,)
     color: np.ndarray  # 0..1, the same by colour, (n,)
     score: np.ndarray  # 0..1, all of it together with the length, (n,)
+    held: np.ndarray  # 0..1, fraction of the line to which the surface reaches by depth, (n,)
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The three fractions, (n,) each."""
+        return self.depth, self.color, self.held
 
 
 def score_borders(
@@ -110,7 +116,7 @@ def score_borders(
         beside = region.cells[rows, columns].mean(axis=2)
         scores = scores * np.minimum(beside / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
-    return Borders(1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best])
+    return Borders(1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best], evidence[each, best, 3])
 
 
 def end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
@@ -205,11 +211,12 @@ def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plan
 
     Depth and colour are read at distances `depth_px` and `color_px` (3,) on both sides of places along the lines; a
     reading within the gate, fraction of depth, of the plane 1/Z = p u + q v + r is on the surface, `color` and `paint`
-    are its colours, paint empty if unknown, `shadowed` whether shadows lie on it. Returns score, fraction by depth and fraction by colour, (n, 2, 3).
+    are its colours, paint empty if unknown, `shadowed` whether shadows lie on it. Returns score, fraction by depth, fraction by colour, and fraction to which the
+    surface reaches, (n, 2, 4).
     """
-    states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 3))
+    states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 4))
     colors, inside = np.empty((2, 3, 3)), np.empty((2, 3), np.bool_)
-    sums, off = np.empty((2, 7)), np.empty((2, 2, 3))
+    sums, off = np.empty((2, 8)), np.empty((2, 2, 3))
     for i in range(len(pixels)):
         sums[:] = 0.0
         off[:] = 0.0
@@ -235,13 +242,13 @@ def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plan
         for side in range(2):
             if count < _LEAST_SHARE * places:
                 continue
-            seen, ended, covered, stops, changes, own, by_light = sums[side] / count
+            seen, ended, covered, stops, changes, own, by_light, held = sums[side] / count
             by_depth = ended * stops
             shadow = near and (beyond or by_depth > _ENDS_SOON)
             by_color = (changes - by_light if shadow else changes) * own
             ends = max(by_depth * (_DEPTH_ONLY + (1.0 - _DEPTH_ONLY) * by_color), _COLOR_ONLY * by_color)
             evidence[i, side, 0] = seen * ends * (1.0 - covered)
-            evidence[i, side, 1], evidence[i, side, 2] = by_depth, by_color
+            evidence[i, side, 1], evidence[i, side, 2], evidence[i, side, 3] = by_depth, by_color, held
     return evidence
 
 
@@ -314,7 +321,8 @@ def _read_color(rgb, mask, u, v, nx, ny, distances, colors, inside):
 
 @inner
 def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, shadowed, shaded, sums):
-    """Add the evidence of one place with the surface on the inner side: seen, ended, covered, goes on, changes, own, by light."""
+    """Add the evidence of one place with the surface on the inner side: seen, ended, covered, goes on, changes, own, by light,
+    held."""
     count = len(outer_states)
     bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
     own = bare or _is_painted(inner_colors[0], paint) or (shadowed and _is_shaded(inner_colors[0], color))
@@ -344,6 +352,7 @@ def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, c
     sums[4] += 1.0 if changes and not goes_on else 0.0
     sums[5] += 1.0 if own else 0.0
     sums[6] += 1.0 if changes and not goes_on and shaded else 0.0
+    sums[7] += 1.0 if _any(inner_states, 0, _HELD_TO, _ON) else 0.0
 
 
 @inner
