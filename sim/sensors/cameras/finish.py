@@ -99,7 +99,7 @@ class PictureFinish:
         if self.outdoor is None:
             return np.zeros(0, np.intp)
         painted = None
-        if self.outdoor.wet:
+        if self.outdoor.needs_paint:
             coverage = canvas.painted
             steps = board_steps(canvas.geometry, canvas.pixels_per_m, TEXTURE_PAD_PX)
             size = rgb.shape[1::-1]

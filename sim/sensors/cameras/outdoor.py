@@ -86,9 +86,9 @@ class Outdoor:
         self._u, self._v = u, v
 
     @property
-    def wet(self) -> bool:
-        """Whether the paint's place in the picture matters."""
-        return self._errors.wet_gloss > 0.0 or self._errors.wet_holes > 0.0
+    def needs_paint(self) -> bool:
+        """Whether the place of fresh paint matters: it is wet, and covers rust, stains and dirt."""
+        return self._surface.present or self._errors.wet_gloss > 0.0 or self._errors.wet_holes > 0.0
 
     def scene(self, picture: np.ndarray, view: View, painted: np.ndarray | None) -> np.ndarray:
         """Surface and light on board and wall, before lens and vehicle; float32 (H, W, 3).
@@ -96,7 +96,7 @@ class Outdoor:
         Args:
             picture: As drawn, uint8 or float32 (H, W, 3).
             view: Pose of the camera.
-            painted: Fraction of every pixel that is painted, 0..1, float32 (H, W), or None.
+            painted: Fraction of every pixel that is freshly painted, 0..1, float32 (H, W), or None.
         """
         picture = picture.astype(np.float32)
         p, q, r = view.pixel_plane(0.0)
@@ -106,7 +106,7 @@ class Outdoor:
         rays = (rays @ view.rotation.astype(np.float32)).astype(np.float32)  # in the world, depth 1 in the camera
         points = view.center[1:].astype(np.float32) + rays[..., 1:] * depth[..., None].astype(np.float32)
         right, down = self._ground.places(points)
-        self._surface.cover(picture, right, down)
+        self._surface.cover(picture, right, down, painted)
         if self._beams or self._own_shade:
             taken = self._beam_shadow(right, down)
             if self._own_shade:

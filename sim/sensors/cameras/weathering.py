@@ -64,6 +64,9 @@ class Weathering:
         errors: How much of them.
         ground: The board.
         seed: Seed of the flight.
+
+    Attributes:
+        present: Whether there is any.
     """
 
     def __init__(self, errors: OutdoorErrors, ground: Ground, seed: int) -> None:
@@ -81,15 +84,25 @@ class Weathering:
             self._stain(ground, rng)
         if errors.broken_m:
             self._dirt(ground, errors.broken_m, rng)
-        self._any = bool(self._cover.any())
+        self.present = bool(self._cover.any())
 
-    def cover(self, picture: np.ndarray, right: np.ndarray, down: np.ndarray) -> None:
-        """Lay it over a picture, float32 (H, W, 3), in place; places right of and down from the top left corner [m]."""
-        if not self._any:
+    def cover(self, picture: np.ndarray, right: np.ndarray, down: np.ndarray, painted: np.ndarray | None) -> None:
+        """Lay it over a picture in place, under fresh paint.
+
+        Args:
+            picture: Board and wall, float32 (H, W, 3).
+            right: Places to the right of the board's top left corner [m], float32 (H, W).
+            down: Places down from there [m], float32 (H, W).
+            painted: Fraction of every pixel that is freshly painted, 0..1, float32 (H, W), or None.
+        """
+        if not self.present:
             return
         at = self._at(right), self._at(down)
         cover = cv2.remap(self._cover, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         color = cv2.remap(self._color, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        if painted is not None:
+            cover *= 1.0 - painted
+            color *= 1.0 - painted[..., None]
         picture *= 1.0 - cover[..., None]
         picture += color  # weighted with the cover already
 
@@ -172,6 +185,9 @@ class Glass:
         errors: How many.
         shape: (height, width) of the picture [px].
         seed: Seed of the flight.
+
+    Attributes:
+        present: Whether there are any.
     """
 
     def __init__(self, errors: OutdoorErrors, shape: tuple[int, int], seed: int) -> None:

@@ -13,7 +13,7 @@ from ibvs_qp.vision.picture.camera import RgbdCamera
 from sim.sensors.cameras.arm import vehicle_layer
 from sim.world.scene import CameraScene, Scene
 from tests.support.truth.device_depth import device_depth
-from tests.support.truth.picture import outdoors, paint_picture, painted
+from tests.support.truth.picture import fresh, outdoors, paint_picture, painted
 from tests.support.truth.range import measure_depth
 from tests.support.truth.scenes import TruthScene
 
@@ -80,7 +80,7 @@ def render_frame(
         depth = device_depth(scene, scene.device, rng)
         raw = RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns)
         frame = RgbdCamera(scene.device.settings).picture(raw)
-    if outside is not None and outside.wet:
+    if outside is not None and fresh(scene):
         depth.reshape(-1)[outside.holes(painted(scene))] = 0.0
     if layer is not None:
         depth[mask] = 1.0 / layer.inverse_depth[mask]

@@ -45,7 +45,7 @@ def paint_picture(
     width = scene.camera[0]
     picture = plain_picture(scene, rng) if plain is None else plain
     if outside is not None:
-        picture = outside.scene(picture, scene.view, painted(scene) if outside.wet else None)
+        picture = outside.scene(picture, scene.view, painted(scene) if fresh(scene) else None)
     light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
     picture = picture * light
     kernel = _motion_kernel(scene.motion_px)
@@ -76,6 +76,11 @@ def plain_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
     if scene.device is not None:
         picture = through_device(picture, scene, SUPERSAMPLING) * np.float32(exposure_gain(scene, rng))
     return cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def fresh(scene: TruthScene) -> bool:
+    """Whether the strokes are wet; else they are of older paint, with rust and stains on it."""
+    return scene.outdoor.wet_gloss > 0.0 or scene.outdoor.wet_holes > 0.0
 
 
 def painted(scene: TruthScene) -> np.ndarray:
