@@ -56,12 +56,12 @@ _TINT, _TINT_NOISE = 0.055, 3.0
 
 
 @inner
-def in_other_light(ones, twos, dot, noise):
-    """Whether two colours are one in sun and in shadow: squares of their lengths, their product, noise [1 of a pixel's]."""
+def in_other_light(ones, twos, dot):
+    """Whether two colours are one in sun and in shadow, by the squares of their lengths and their product."""
     darker, brighter = min(ones, twos), max(ones, twos)
     if darker < DARKEST * DARKEST * brighter or darker > SHADED * SHADED * brighter or darker <= 0.0:
         return False
-    gate = _TINT + noise * _TINT_NOISE / math.sqrt(darker)
+    gate = _TINT + _TINT_NOISE / math.sqrt(darker)
     return 1.0 - dot * dot / (ones * twos) < gate * gate
 
 
@@ -73,7 +73,7 @@ def _shaded(colors, color):
     for k in range(len(colors)):
         red, green, blue = colors[k, 0], colors[k, 1], colors[k, 2]
         dot = red * color[0] + green * color[1] + blue * color[2]
-        found[k] = in_other_light(red * red + green * green + blue * blue, own, dot, 1.0)
+        found[k] = in_other_light(red * red + green * green + blue * blue, own, dot)
     return found
 
 

@@ -49,7 +49,7 @@ _CONTRAST, _SAME_COLOR = 16.0, 24.0
 _SAME_PAINT = 30.0
 #: Of the places beyond a line at which colour is read, this many must be the surface's for it to go on.
 _MOST = 2
-#: A shadow's edge has no step of depth: means over a line of the readings before this place in the list, and of those from it on,
+#: A shadow's edge has no step of depth: means over a line of readings before this place in the list, and from it on,
 #: differ by less than this fraction; a board 1 cm before a wall, seen from 1 m, has 1 %. Readings farther off are of
 #: another thing; of the near ones this fraction at most may be.
 _FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW = 3, 0.007, 0.05, 0.3
@@ -102,7 +102,9 @@ def score_borders(
     distances = picture.scale * _DEPTH_PX, picture.scale * _COLOR_PX
     own, other = np.ascontiguousarray(region.color, float), np.empty(0) if paint is None else paint.astype(float)
     images, places = (picture.rgb, picture.depth, picture.mask), _PLACES // 2 if theta is None else _PLACES
-    evidence = _border_evidence(*images, ends, normals, *distances, plane, depth_gate(region.plane), own, other, region.shadowed, places)
+    evidence = _border_evidence(
+        *images, ends, normals, *distances, plane, depth_gate(region.plane), own, other, region.shadowed, places
+    )
     rows, columns = np.nonzero(region.colored)
     samples = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
     beyond = _samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride)
@@ -116,7 +118,9 @@ def score_borders(
         beside = region.cells[rows, columns].mean(axis=2)
         scores = scores * np.minimum(beside / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
-    return Borders(1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best], evidence[each, best, 3])
+    return Borders(
+        1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best], evidence[each, best, 3]
+    )
 
 
 def end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
@@ -206,13 +210,15 @@ def places_beside(
     "f8[:, :, ::1](u1[:, :, ::1], f4[:, ::1], u1[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8,"
     " f8[::1], f8[::1], b1, i8)"
 )
-def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, paint, shadowed, places):
+def _border_evidence(
+    rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, paint, shadowed, places
+):
     """Evidence that the surface ends at lines, with the surface along their normals, and against them.
 
     Depth and colour are read at distances `depth_px` and `color_px` (3,) on both sides of places along the lines; a
     reading within the gate, fraction of depth, of the plane 1/Z = p u + q v + r is on the surface, `color` and `paint`
-    are its colours, paint empty if unknown, `shadowed` whether shadows lie on it. Returns score, fraction by depth, fraction by colour, and fraction to which the
-    surface reaches, (n, 2, 4).
+    are its colours, paint empty if unknown, `shadowed` whether shadows lie on it. Returns score, fraction by depth,
+    fraction by colour, and fraction to which the surface reaches, (n, 2, 4).
     """
     states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 4))
     colors, inside = np.empty((2, 3, 3)), np.empty((2, 3), np.bool_)
@@ -237,7 +243,18 @@ def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plan
             shaded = _light_changes(colors[0], colors[1])
             for side in range(2):
                 far = 1 - side
-                _ends_here(states[side], states[far], colors[side], colors[far], inside[far], color, paint, shadowed, shaded, sums[side])
+                _ends_here(
+                    states[side],
+                    states[far],
+                    colors[side],
+                    colors[far],
+                    inside[far],
+                    color,
+                    paint,
+                    shadowed,
+                    shaded,
+                    sums[side],
+                )
         near, beyond = _level(off[:, 0]), _level(off[:, 1])
         for side in range(2):
             if count < _LEAST_SHARE * places:
@@ -292,7 +309,7 @@ def _light_changes(one, two):
     for c in range(3):
         a, b = 0.5 * (one[0, c] + one[1, c]), 0.5 * (two[0, c] + two[1, c])
         dot, ones, twos = dot + a * b, ones + a * a, twos + b * b
-    return in_other_light(ones, twos, dot, 1.0)
+    return in_other_light(ones, twos, dot)
 
 
 @inner
@@ -300,7 +317,7 @@ def _is_shaded(one, color):
     """Whether a colour (3,) is another in sun or in shadow."""
     dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
     ones, twos = one[0] ** 2 + one[1] ** 2 + one[2] ** 2, color[0] ** 2 + color[1] ** 2 + color[2] ** 2
-    return in_other_light(ones, twos, dot, 1.0)
+    return in_other_light(ones, twos, dot)
 
 
 @inner
@@ -321,8 +338,10 @@ def _read_color(rgb, mask, u, v, nx, ny, distances, colors, inside):
 
 @inner
 def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, shadowed, shaded, sums):
-    """Add the evidence of one place with the surface on the inner side: seen, ended, covered, goes on, changes, own, by light,
-    held."""
+    """Add the evidence of one place with the surface on the inner side.
+
+    It is seen, ended, covered, goes on, changes, own, changes by light, and held.
+    """
     count = len(outer_states)
     bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
     own = bare or _is_painted(inner_colors[0], paint) or (shadowed and _is_shaded(inner_colors[0], color))

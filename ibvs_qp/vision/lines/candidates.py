@@ -33,9 +33,9 @@ _PAINT_CONFIDENCE = 0.9
 _SHOWS, _DEPTH_STEP = 0.6, 0.5
 #: A border is sure to end the surface if depth, colour and the surface next to it show that for this fraction of it.
 _ENDS = 0.5
-#: Another border is nested in it if it lies farther inwards by less than this, the farthest place at which depth is read
-#: to see the surface's end [px at 640], along it (cosine), and the other has this fraction of its score and
-#: of its length at least; it keeps this part of score and confidence.
+#: Another border is nested in it if it lies farther inwards by less than this, the farthest place at which depth is
+#: read to see the surface's end [px at 640], along it (cosine), and the other has this fraction of its score and of its
+#: length at least; it keeps this part of score and confidence.
 _SOON_PX, _ALONG, _RIVAL, _LONG_ENOUGH, _NESTED = 26.0, 0.995, 0.7, 0.33, 0.6
 #: Length that earns the full score of an edge of paint, fraction of the picture's width.
 _FULL_LENGTH = 0.4
@@ -99,7 +99,7 @@ class LineSearch:
             fits += self._fits.fit_segments(picture, segments[order], beyond, contents=True, half_width_px=_PAINT_PX)
         shortest = config.min_length * picture.mask.shape[1]
         found = self.classify_lines([fit for fit in fits if fit is not None], picture, surface, shortest)
-        return _outermost(_each_edge_once(found, picture.scale), picture.scale)
+        return _outermost(_each_edge_once(found, picture.scale), picture.scale / picture.intrinsics[0])
 
     def classify_lines(
         self, fits: list[RefinedLine], picture: Picture, surface: SurfaceRegion, shortest_px: float = 0.0
@@ -149,34 +149,33 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
     return sorted(kept, key=lambda entry: -entry.score)
 
 
-def _outermost(lines: list[Candidate], scale: float) -> list[Candidate]:
+def _outermost(lines: list[Candidate], pixel: float) -> list[Candidate]:
     """The lines, best first; a border beside one farther out, where the surface surely ends, is no sure one.
 
-    Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well.
+    Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well. A
+    pixel of a picture 640 wide is given normalised.
     """
-    kept = []
+    kept, low, high = [], pixel * _SAME_PX, pixel * _SOON_PX
     for line in lines:
         rivals = [other for other in lines if other.ends_surface and other.score >= _RIVAL * line.score]
-        if line.borders_plane and any(_beyond(line, other, scale) for other in rivals):
+        if line.borders_plane and any(_beyond(line, other, low, high) for other in rivals):
             line = replace(line, score=_NESTED * line.score, confidence=_NESTED * line.confidence)
         kept.append(line)
     return sorted(kept, key=lambda entry: -entry.score)
 
 
-def _beyond(line: Candidate, other: Candidate, scale: float) -> bool:
-    """Whether another border runs along a line a little farther from the surface."""
-    turn = line.line.theta - other.line.theta
-    same = math.cos(turn) * line.surface_side * other.surface_side
-    if same < _ALONG or other.line.length_px < _LONG_ENOUGH * line.line.length_px:
+def _beyond(line: Candidate, other: Candidate, low: float, high: float) -> bool:
+    """Whether another border runs along a line, farther from the surface by a normalised distance between two."""
+    side = math.cos(line.line.theta - other.line.theta) * line.surface_side * other.surface_side
+    if side < _ALONG or other.line.length_px < _LONG_ENOUGH * line.line.length_px:
         return False
-    ways = []
-    for one, two, sign in ((line.line, other.line, 1.0), (other.line, line.line, -1.0)):
-        middle, normal = 0.5 * (one.ends_px[0] + one.ends_px[1]), two.ends_px[1] - two.ends_px[0]
-        inwards = np.array((-normal[1], normal[0])) / max(float(np.hypot(*normal)), 1e-9)
-        side = other.surface_side if two is other.line else line.surface_side
-        inwards *= side * math.copysign(1.0, float(inwards @ (math.cos(two.theta), math.sin(two.theta))))
-        ways.append(sign * float((middle - two.ends_px[0]) @ inwards))
-    return scale * _SAME_PX < min(ways) and max(ways) < scale * _SOON_PX
+    return low < _inwards(line, other) < high and low < -_inwards(other, line) < high
+
+
+def _inwards(line: Candidate, other: Candidate) -> float:
+    """How far the middle of a line lies from another border towards the surface of that, normalised."""
+    x, y = (0.5 * (line.line.segment[0] + line.line.segment[1])).tolist()
+    return other.surface_side * (x * math.cos(other.line.theta) + y * math.sin(other.line.theta) - other.line.rho)
 
 
 def _adds(longer: Candidate, line: Candidate) -> bool:

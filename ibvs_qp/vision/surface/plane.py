@@ -29,8 +29,8 @@ _SPREAD = 400
 _FLAT = 1e-6
 #: Planes are held in front of the camera: least 1/Z [1/m].
 _FARTHEST = 1e-3
-#: Least part of the surface in shadow, and samples along the shadow's edge, within so many cells of it; their mean depth
-#: differs by less than this fraction: a board 1 cm before a wall, seen from 1 m, has 1 %.
+#: Least part of the surface in shadow, and samples along the shadow's edge, within so many cells of it; their mean
+#: depth differs by less than this fraction: a board 1 cm before a wall, seen from 1 m, has 1 %.
 _SHADED_SHARE, _LEAST_EDGE, _NEAR_SHADE, _SHADE_STEP = 0.03, 12, 2, 0.006
 _NO_LABELS = np.empty(0, np.uint8)
 #: A reading within this fraction of depth is on the surface at least and at most; three sigmas of the fit between.

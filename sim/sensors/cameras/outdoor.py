@@ -125,7 +125,7 @@ class Outdoor:
         return picture
 
     def lens(self, picture: np.ndarray) -> np.ndarray:
-        """Drops and dust, exposure, and the noise of low light, on a picture uint8 or float32 (H, W, 3) of that type."""
+        """A picture, uint8 or float32 (H, W, 3), with drops and dust, exposure, and the noise of low light."""
         if not (self._glass.present or self._gain != 1.0 or self._dark.size):
             return picture
         seen = self._glass.seen(picture.astype(np.float32)) * np.float32(self._gain)

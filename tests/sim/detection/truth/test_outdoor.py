@@ -21,8 +21,6 @@ from tests.support.truth.accuracy import line_errors
 from tests.support.truth.outdoor import OUTSIDE, frames, measure
 
 VEHICLE = VehicleParams()
-#: Families with effects that are fixed on the wall.
-ON_THE_WALL = ("beam shadow", "rust", "stains", "broken edges")
 
 
 def flown(outdoor: OutdoorErrors, right_m: float = 0.0, seed: int = 3, kind: str = "plane"):
@@ -32,7 +30,7 @@ def flown(outdoor: OutdoorErrors, right_m: float = 0.0, seed: int = 3, kind: str
     for k in range(50):
         canvas.stroke(None if k == 0 else (0.5 + 0.01 * (k - 1), 0.3), (0.5 + 0.01 * k, 0.3))
     camera = (PlaneCamera if kind == "plane" else CurvedCamera)(scene, VEHICLE, canvas, seed, noise=False)
-    tip = canvas.geometry.start_tip + (0.3, right_m - 0.5, -0.25)
+    tip = canvas.geometry.start_tip + np.array((0.3, right_m - 0.5, -0.25))
     return camera.capture(tip - np.array(VEHICLE.tip_position_m), np.array([1.0, 0.0, 0.0, 0.0]), 0)
 
 
