@@ -140,6 +140,12 @@ class Canvas:
         self._draw_stamps()
         return _inner(self._coverage).astype(np.float32) / np.float32(255.0)
 
+    @property
+    def painted(self) -> np.ndarray:
+        """Painted fraction in 255ths of the padded `texture`, uint8 (h, w), not to be written."""
+        self._draw_stamps()
+        return self._coverage
+
     def thumbnail(self, pixels_per_m: float) -> np.ndarray:
         """Painted fraction in 255ths at a coarser resolution, uint8."""
         self._draw_stamps()

@@ -175,6 +175,25 @@ class ReliefErrors(Checked):
 
 
 @dataclass(frozen=True, kw_only=True)
+class OutdoorErrors(Checked):
+    """Pictures outside, drawn from the seed; an effect has between half of its size and all of it."""
+
+    beams: int = setting(0, "shadows of beams across the board", low=0, high=20)
+    beam_shade: float = _size("light that the shadow of a beam takes", "", 0.9)
+    own_shade: float = _size("light that the vehicle's own shadow takes, propellers less", "", 0.9)
+    glare: float = _size("the sun mirrored by the wall, fraction of white", "", 3.0)
+    overexposure: float = _size("exposure beyond the nominal one: bright colours are cut off", "", 3.0)
+    low_light: float = _size("light that is missing, with the noise of its amplification", "", 0.95)
+    rust_per_m: float = _size("streaks of rust per width of the board", "1/m", 100.0)
+    stains_per_m2: float = _size("blots of the paint's colour", "1/m^2", 200.0)
+    broken_m: float = _size("length over which dirt of the wall's colour covers one edge", "m", 5.0)
+    wet_gloss: float = _size("sky and sun mirrored by wet paint, fraction of white", "", 1.0)
+    wet_holes: float = _size("fraction of wet paint without a depth reading", "", 1.0)
+    drops: int = setting(0, "rain drops on the lens", low=0, high=200)
+    dust: int = setting(0, "specks of dust on the lens", low=0, high=500)
+
+
+@dataclass(frozen=True, kw_only=True)
 class WorldErrors:
     """All errors of a world."""
 
@@ -191,6 +210,7 @@ class WorldErrors:
     arm: ArmErrors = field(default_factory=ArmErrors)
     brush: BrushErrors = field(default_factory=BrushErrors)
     relief: ReliefErrors = field(default_factory=ReliefErrors)
+    outdoor: OutdoorErrors = field(default_factory=OutdoorErrors)
 
 
 def world_names() -> list[str]:

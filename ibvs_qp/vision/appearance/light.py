@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.picture.layout import Intrinsics
 
 #: Step between two levels of light [ln]: half of it is a seventh of the gate of a white board.
@@ -45,6 +47,40 @@ _PULL = np.array((0.0, 1e-3, 1e-3, 4e-3, 4e-3, 4e-3))
 _UNEXPLAINED = 0.5
 #: The field is not continued farther than this beyond the light it was fitted to [ln].
 _BEYOND = 0.06
+
+#: A shadow scales all channels alike: a colour in it is that in the sun times a light within these, or the other way
+#: round, and the sine of the angle between both is small: sky light is bluer than the sun (4 %), and noise of a pixel
+#: [grey levels].
+SHADED, DARKEST = 0.92, 0.12
+_TINT, _TINT_NOISE = 0.055, 3.0
+
+
+@inner
+def in_other_light(ones, twos, dot):
+    """Whether two colours are one in sun and in shadow, by the squares of their lengths and their product."""
+    darker, brighter = min(ones, twos), max(ones, twos)
+    if darker < DARKEST * DARKEST * brighter or darker > SHADED * SHADED * brighter or darker <= 0.0:
+        return False
+    gate = _TINT + _TINT_NOISE / math.sqrt(darker)
+    return 1.0 - dot * dot / (ones * twos) < gate * gate
+
+
+@kernel("b1[::1](f8[:, ::1], f8[::1])")
+def _shaded(colors, color):
+    """Whether colours (n, 3) are a colour (3,) in sun or shadow, (n,)."""
+    found = np.empty(len(colors), np.bool_)
+    own = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
+    for k in range(len(colors)):
+        red, green, blue = colors[k, 0], colors[k, 1], colors[k, 2]
+        dot = red * color[0] + green * color[1] + blue * color[2]
+        found[k] = in_other_light(red * red + green * green + blue * blue, own, dot)
+    return found
+
+
+def shaded_colors(colors: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """Whether colours (..., 3) are a colour (3,) where a shadow begins or ends, bool (...)."""
+    found = _shaded(np.ascontiguousarray(colors, float).reshape(-1, 3), np.ascontiguousarray(color, float))
+    return found.reshape(colors.shape[:-1])
 
 
 def squared_distance(colors: np.ndarray, reference: np.ndarray | None) -> np.ndarray:

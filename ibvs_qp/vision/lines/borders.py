@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors, is_alike
+from ibvs_qp.vision.appearance.light import in_other_light
 from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
@@ -40,7 +41,7 @@ _FULL_SHARE = 0.2
 _UNSEEN, _ON, _FARTHER, _NEARER = 0, 1, 2, 3
 #: Distances within which the surface must be seen on its own side, beyond which it must not be, and within which it
 #: goes on, as places in the list of distances.
-_SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM = 5, 5, 1, 4, 2
+_SEEN_WITHIN, _ENDED_FROM, _ON_FROM, _ON_TO, _COVERED_FROM, _HELD_TO = 5, 5, 1, 4, 2, 2
 #: Colours on both sides nearer than this are one; next to the bare surface, a continuation is as near to it [grey
 #: levels].
 _CONTRAST, _SAME_COLOR = 16.0, 24.0
@@ -48,6 +49,12 @@ _CONTRAST, _SAME_COLOR = 16.0, 24.0
 _SAME_PAINT = 30.0
 #: Of the places beyond a line at which colour is read, this many must be the surface's for it to go on.
 _MOST = 2
+#: A shadow's edge has no step of depth: means over a line of readings before this place in the list, and from it on,
+#: differ by less than this fraction; a board 1 cm before a wall, seen from 1 m, has 1 %. Readings farther off are of
+#: another thing; of the near ones this fraction at most may be.
+_FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW = 3, 0.007, 0.05, 0.3
+#: By so large a fraction of the line the surface ends a little farther out, and the shadow's edge lies before that.
+_ENDS_SOON = 0.3
 #: A border that only colour shows counts this much, and one that depth shows against the colour.
 _COLOR_ONLY, _DEPTH_ONLY = 0.75, 0.5
 #: Least fraction of the places along a line that nothing hides.
@@ -62,6 +69,12 @@ class Borders:
     depth: np.ndarray  # 0..1, fraction of the line along which the surface ends by depth, (n,)
     color: np.ndarray  # 0..1, the same by colour, (n,)
     score: np.ndarray  # 0..1, all of it together with the length, (n,)
+    held: np.ndarray  # 0..1, fraction of the line to which the surface reaches by depth, (n,)
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The three fractions, (n,) each."""
+        return self.depth, self.color, self.held
 
 
 def score_borders(
@@ -89,7 +102,9 @@ def score_borders(
     distances = picture.scale * _DEPTH_PX, picture.scale * _COLOR_PX
     own, other = np.ascontiguousarray(region.color, float), np.empty(0) if paint is None else paint.astype(float)
     images, places = (picture.rgb, picture.depth, picture.mask), _PLACES // 2 if theta is None else _PLACES
-    evidence = _border_evidence(*images, ends, normals, *distances, plane, depth_gate(region.plane), own, other, places)
+    evidence = _border_evidence(
+        *images, ends, normals, *distances, plane, depth_gate(region.plane), own, other, region.shadowed, places
+    )
     rows, columns = np.nonzero(region.colored)
     samples = np.column_stack((columns, rows)) * float(grid.stride) + grid.offset
     beyond = _samples_beyond(samples, ends, normals, _CELLS_BEYOND * grid.stride)
@@ -103,7 +118,9 @@ def score_borders(
         beside = region.cells[rows, columns].mean(axis=2)
         scores = scores * np.minimum(beside / _MOSTLY, 1.0)
     best, each = np.where(scores[:, 0] >= scores[:, 1], 0, 1), np.arange(len(ends))
-    return Borders(1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best])
+    return Borders(
+        1 - 2 * best, evidence[each, best, 1], evidence[each, best, 2], scores[each, best], evidence[each, best, 3]
+    )
 
 
 def end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
@@ -191,20 +208,24 @@ def places_beside(
 
 @kernel(
     "f8[:, :, ::1](u1[:, :, ::1], f4[:, ::1], u1[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8,"
-    " f8[::1], f8[::1], i8)"
+    " f8[::1], f8[::1], b1, i8)"
 )
-def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, paint, places):
+def _border_evidence(
+    rgb, depth, mask, pixels, normals, depth_px, color_px, plane, gate, color, paint, shadowed, places
+):
     """Evidence that the surface ends at lines, with the surface along their normals, and against them.
 
     Depth and colour are read at distances `depth_px` and `color_px` (3,) on both sides of places along the lines; a
     reading within the gate, fraction of depth, of the plane 1/Z = p u + q v + r is on the surface, `color` and `paint`
-    are its colours, paint empty if unknown. Returns score, fraction by depth and fraction by colour, (n, 2, 3).
+    are its colours, paint empty if unknown, `shadowed` whether shadows lie on it. Returns score, fraction by depth,
+    fraction by colour, and fraction to which the surface reaches, (n, 2, 4).
     """
-    states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 3))
+    states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 4))
     colors, inside = np.empty((2, 3, 3)), np.empty((2, 3), np.bool_)
-    sums = np.empty((2, 6))
+    sums, off = np.empty((2, 8)), np.empty((2, 2, 3))
     for i in range(len(pixels)):
         sums[:] = 0.0
+        off[:] = 0.0
         count = 0
         for k in range(places):
             share = (k + 0.5) / places
@@ -214,28 +235,43 @@ def _border_evidence(rgb, depth, mask, pixels, normals, depth_px, color_px, plan
             for side in range(2):
                 sign = 1.0 if side == 0 else -1.0
                 nx, ny = sign * normals[i, 0], sign * normals[i, 1]
-                _read_depth(depth, mask, u, v, nx, ny, depth_px, plane, gate, states[side])
+                _read_depth(depth, mask, u, v, nx, ny, depth_px, plane, gate, states[side], off[side])
                 free &= _read_color(rgb, mask, u, v, nx, ny, color_px, colors[side], inside[side])
             if not free:
                 continue
             count += 1
+            shaded = _light_changes(colors[0], colors[1])
             for side in range(2):
                 far = 1 - side
-                _ends_here(states[side], states[far], colors[side], colors[far], inside[far], color, paint, sums[side])
+                _ends_here(
+                    states[side],
+                    states[far],
+                    colors[side],
+                    colors[far],
+                    inside[far],
+                    color,
+                    paint,
+                    shadowed,
+                    shaded,
+                    sums[side],
+                )
+        near, beyond = _level(off[:, 0]), _level(off[:, 1])
         for side in range(2):
             if count < _LEAST_SHARE * places:
                 continue
-            seen, ended, covered, stops, changes, own = sums[side] / count
-            by_depth, by_color = ended * stops, changes * own
+            seen, ended, covered, stops, changes, own, by_light, held = sums[side] / count
+            by_depth = ended * stops
+            shadow = near and (beyond or by_depth > _ENDS_SOON)
+            by_color = (changes - by_light if shadow else changes) * own
             ends = max(by_depth * (_DEPTH_ONLY + (1.0 - _DEPTH_ONLY) * by_color), _COLOR_ONLY * by_color)
             evidence[i, side, 0] = seen * ends * (1.0 - covered)
-            evidence[i, side, 1], evidence[i, side, 2] = by_depth, by_color
+            evidence[i, side, 1], evidence[i, side, 2], evidence[i, side, 3] = by_depth, by_color, held
     return evidence
 
 
 @inner
-def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states):
-    """Meaning of the depth at growing distances from a place."""
+def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states, off):
+    """Meaning of the depth at growing distances from a place; adds up how far off the plane it is, and the readings."""
     height, width = mask.shape
     for d in range(len(distances)):
         column, row = round(u + distances[d] * nx), round(v + distances[d] * ny)
@@ -246,6 +282,42 @@ def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states):
         if z > 0.0 and z < np.inf:
             relative = z * (plane[0] * column + plane[1] * row + plane[2]) - 1.0
             states[d] = _ON if abs(relative) <= gate else _FARTHER if relative > 0.0 else _NEARER
+            part = 1 if d >= _FAR_FROM else 0
+            if abs(relative) < _NEAR_PLANE:
+                off[part, 0] += relative
+                off[part, 1] += 1.0
+            else:
+                off[part, 2] += 1.0
+
+
+@inner
+def _level(off):
+    """Whether the surface goes on beyond a line by depth.
+
+    Of the readings on both sides these are the sum, the number, and the number of those far off, (2, 3).
+    """
+    one, two = off[0, 1], off[1, 1]
+    if one <= off[0, 2] * (1.0 / _FEW - 1.0) or two <= off[1, 2] * (1.0 / _FEW - 1.0):
+        return False
+    return abs(off[0, 0] / one - off[1, 0] / two) < _NO_STEP
+
+
+@inner
+def _light_changes(one, two):
+    """Whether the colours next to a place, (3, 3) by distance on each side, are one colour in sun and in shadow."""
+    dot = ones = twos = 0.0
+    for c in range(3):
+        a, b = 0.5 * (one[0, c] + one[1, c]), 0.5 * (two[0, c] + two[1, c])
+        dot, ones, twos = dot + a * b, ones + a * a, twos + b * b
+    return in_other_light(ones, twos, dot)
+
+
+@inner
+def _is_shaded(one, color):
+    """Whether a colour (3,) is another in sun or in shadow."""
+    dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
+    ones, twos = one[0] ** 2 + one[1] ** 2 + one[2] ** 2, color[0] ** 2 + color[1] ** 2 + color[2] ** 2
+    return in_other_light(ones, twos, dot)
 
 
 @inner
@@ -265,11 +337,14 @@ def _read_color(rgb, mask, u, v, nx, ny, distances, colors, inside):
 
 
 @inner
-def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, sums):
-    """Add the evidence of one place with the surface on the inner side: seen, ended, covered, goes on, changes, own."""
+def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, color, paint, shadowed, shaded, sums):
+    """Add the evidence of one place with the surface on the inner side.
+
+    It is seen, ended, covered, goes on, changes, own, changes by light, and held.
+    """
     count = len(outer_states)
     bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
-    own = bare or _is_painted(inner_colors[0], paint)
+    own = bare or _is_painted(inner_colors[0], paint) or (shadowed and _is_shaded(inner_colors[0], color))
     like = 0
     for d in range(len(outer_colors)):
         if inside[d] and _is_painted(outer_colors[d], paint):
@@ -295,6 +370,8 @@ def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, c
     sums[3] += 0.0 if goes_on else 1.0
     sums[4] += 1.0 if changes and not goes_on else 0.0
     sums[5] += 1.0 if own else 0.0
+    sums[6] += 1.0 if changes and not goes_on and shaded else 0.0
+    sums[7] += 1.0 if _any(inner_states, 0, _HELD_TO, _ON) else 0.0
 
 
 @inner

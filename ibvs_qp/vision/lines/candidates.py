@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,12 @@ _HOPELESS = 0.05
 _PAINT_CONFIDENCE = 0.9
 #: Fraction of a line along which its sides must show board and paint, and along which depth rules out an edge of paint.
 _SHOWS, _DEPTH_STEP = 0.6, 0.5
+#: A border is sure to end the surface if depth, colour and the surface next to it show that for this fraction of it.
+_ENDS = 0.5
+#: Another border is nested in it if it lies farther inwards by less than this, the farthest place at which depth is
+#: read to see the surface's end [px at 640], along it (cosine), and the other has this fraction of its score and of its
+#: length at least; it keeps this part of score and confidence.
+_SOON_PX, _ALONG, _RIVAL, _LONG_ENOUGH, _NESTED = 26.0, 0.995, 0.7, 0.33, 0.6
 #: Length that earns the full score of an edge of paint, fraction of the picture's width.
 _FULL_LENGTH = 0.4
 #: Logistic regression on candidates of truth frames (families hard, smeared depth, oblique, printed, flush wall; seeds
@@ -50,6 +56,7 @@ class Candidate:
     borders_plane: bool  # whether the surface ends there
     score: float  # 0..1, ranks the lines of one picture
     confidence: float  # 0..1, fraction of such lines that are of this kind
+    ends_surface: bool = False  # whether depth and colour both show that the surface reaches it and ends
 
 
 class LineSearch:
@@ -92,7 +99,7 @@ class LineSearch:
             fits += self._fits.fit_segments(picture, segments[order], beyond, contents=True, half_width_px=_PAINT_PX)
         shortest = config.min_length * picture.mask.shape[1]
         found = self.classify_lines([fit for fit in fits if fit is not None], picture, surface, shortest)
-        return _each_edge_once(found, picture.scale)
+        return _outermost(_each_edge_once(found, picture.scale), picture.scale / picture.intrinsics[0])
 
     def classify_lines(
         self, fits: list[RefinedLine], picture: Picture, surface: SurfaceRegion, shortest_px: float = 0.0
@@ -126,6 +133,7 @@ class LineSearch:
             borders_plane=kind == "board",
             score=score,
             confidence=confidence,
+            ends_surface=kind == "board" and bool(min(part[index] for part in borders.parts) > _ENDS),
         )
 
 
@@ -139,6 +147,35 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
         elif line.kind == kept[same].kind and _adds(line, kept[same]):
             kept[same] = line
     return sorted(kept, key=lambda entry: -entry.score)
+
+
+def _outermost(lines: list[Candidate], pixel: float) -> list[Candidate]:
+    """The lines, best first; a border beside one farther out, where the surface surely ends, is no sure one.
+
+    Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well. A
+    pixel of a picture 640 wide is given normalised.
+    """
+    kept, low, high = [], pixel * _SAME_PX, pixel * _SOON_PX
+    for line in lines:
+        rivals = [other for other in lines if other.ends_surface and other.score >= _RIVAL * line.score]
+        if line.borders_plane and any(_beyond(line, other, low, high) for other in rivals):
+            line = replace(line, score=_NESTED * line.score, confidence=_NESTED * line.confidence)
+        kept.append(line)
+    return sorted(kept, key=lambda entry: -entry.score)
+
+
+def _beyond(line: Candidate, other: Candidate, low: float, high: float) -> bool:
+    """Whether another border runs along a line, farther from the surface by a normalised distance between two."""
+    side = math.cos(line.line.theta - other.line.theta) * line.surface_side * other.surface_side
+    if side < _ALONG or other.line.length_px < _LONG_ENOUGH * line.line.length_px:
+        return False
+    return low < _inwards(line, other) < high and low < -_inwards(other, line) < high
+
+
+def _inwards(line: Candidate, other: Candidate) -> float:
+    """How far the middle of a line lies from another border towards the surface of that, normalised."""
+    x, y = (0.5 * (line.line.segment[0] + line.line.segment[1])).tolist()
+    return other.surface_side * (x * math.cos(other.line.theta) + y * math.sin(other.line.theta) - other.line.rho)
 
 
 def _adds(longer: Candidate, line: Candidate) -> bool:

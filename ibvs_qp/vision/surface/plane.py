@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT
+from ibvs_qp.vision.appearance.light import shaded_colors
 from ibvs_qp.vision.compilation import MAD_TO_SIGMA, kernel, median
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.layout import SPARSER, CoarseGrid
@@ -28,6 +29,9 @@ _SPREAD = 400
 _FLAT = 1e-6
 #: Planes are held in front of the camera: least 1/Z [1/m].
 _FARTHEST = 1e-3
+#: Least part of the surface in shadow, and samples along the shadow's edge, within so many cells of it; their mean
+#: depth differs by less than this fraction: a board 1 cm before a wall, seen from 1 m, has 1 %.
+_SHADED_SHARE, _LEAST_EDGE, _NEAR_SHADE, _SHADE_STEP = 0.03, 12, 2, 0.006
 _NO_LABELS = np.empty(0, np.uint8)
 #: A reading within this fraction of depth is on the surface at least and at most; three sigmas of the fit between.
 _GATE_LOW, _GATE_HIGH, _GATE_SIGMAS = 0.010, 0.022, 3.0
@@ -257,6 +261,7 @@ class SurfaceRegion:
     color: np.ndarray  # its colour where nothing is printed or painted on it, RGB (3,)
     # whether colour or light separate it from a wall at its depth; `cells` are without the wall then
     by_color: bool = False
+    shadowed: bool = False  # whether shadows lie on it; `colored` is with those samples
 
     def end_band(self, width: int) -> np.ndarray:
         """Samples within so many cells of the surface's end, by depth or by colour, bool (rows, columns)."""
@@ -284,6 +289,33 @@ def samples_on(picture: Picture, plane: PlaneEstimate, seed: tuple[int, int]) ->
     relative = np.where(inverse > 0.0, inverse / predicted - 1.0, np.inf)
     cells = connected_samples(np.abs(relative) < depth_gate(plane), grid, seed)
     return cells if cells.any() or plane.component.shape != cells.shape else plane.component
+
+
+def shaded_samples(
+    picture: Picture, plane: np.ndarray, cells: np.ndarray, lit: np.ndarray, color: np.ndarray
+) -> np.ndarray | None:
+    """Samples of the surface in other light, where a shadow falls on it; None without a shadow.
+
+    Colour alone does not tell a shadow from a grey wall behind a white board, but that has a step of depth.
+
+    Args:
+        picture: The picture.
+        plane: (a, b, c) of the surface [1/m].
+        cells: Samples on it by depth, bool (rows, columns).
+        lit: Samples of its colour, bool (rows, columns).
+        color: This colour, RGB (3,).
+    """
+    lit = cells & lit
+    shaded = cells & ~lit & shaded_colors(picture.colors, color)
+    if int(np.count_nonzero(shaded)) < _SHADED_SHARE * int(np.count_nonzero(cells)):
+        return None
+    near = np.ones((2 * _NEAR_SHADE + 1, 2 * _NEAR_SHADE + 1), np.uint8)
+    edges = (one & (cv2.dilate(two.view(np.uint8), near) > 0) for one, two in ((shaded, lit), (lit, shaded)))
+    relative = picture.inverse.reshape(-1) / np.maximum(picture.grid.design @ plane, _FARTHEST)
+    dark, bright = (relative[edge.reshape(-1)] for edge in edges)
+    if min(len(dark), len(bright)) < _LEAST_EDGE or abs(float(dark.mean() - bright.mean())) > _SHADE_STEP:
+        return None
+    return shaded
 
 
 def middle_cell(cells: np.ndarray) -> tuple[int, int]:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, OTHER, SurfaceColors, alike_colors
+from ibvs_qp.vision.appearance.light import shaded_colors
 from ibvs_qp.vision.config import PlaneConfig
 from ibvs_qp.vision.picture.layout import Cell, CoarseGrid
 from ibvs_qp.vision.picture.picture import Picture
@@ -21,6 +22,7 @@ from ibvs_qp.vision.surface.plane import (
     on_surface,
     refit_plane,
     samples_on,
+    shaded_samples,
 )
 from ibvs_qp.vision.surface.search import PlaneSearch, depth_problem, facing, grown_plane
 
@@ -203,27 +205,39 @@ class SurfaceTracker:
         cells = samples_on(picture, plane, seed)
         color = ground_color(picture, cells, seed) if colors.board is None else colors.board
         alike = alike_colors(picture.colors, color)
+        shade = shaded_samples(picture, plane.inverse_depth, cells, alike, color)
         # where depth does not separate the surface from a wall close behind it, its light must
-        even = evenly_lit(picture, cells & alike, seed) if _flush(cells, inverse) else None
+        even = evenly_lit(picture, cells & alike, seed) if shade is None and _flush(cells, inverse) else None
         # in some light a wall may have the surface's colour: the plane is that of the colour itself
         prefer = colors.like(picture.colors, color)
         if even is not None:
             prefer = np.where(even, np.uint8(BOARD), np.uint8(OTHER))
+        if shade is not None:
+            prefer = np.where(shade, np.uint8(BOARD), prefer)
         own = cells & (prefer == BOARD)
         if int(own.sum()) >= config.min_samples:
             again = refit_plane(grid, inverse, prefer, plane.inverse_depth, down, config, seed=middle_cell(own))
             if isinstance(again, PlaneEstimate):
                 plane = again
                 cells = samples_on(picture, plane, middle_cell(own))
+        if shade is not None:
+            alike = alike | shaded_colors(picture.colors, color)
         flush = even is not None or _flush(cells, inverse)
-        if even is None and flush:  # noise may hide the wall until the plane is exact
+        if even is None and shade is None and flush:  # noise may hide the wall until the plane is exact
             even = evenly_lit(picture, cells & alike, seed)
         if even is not None:  # other samples of its depth are the wall
             cells, alike = cells & even, alike | even
         elif flush:
-            alike = prefer == BOARD
+            alike = (prefer == BOARD) if shade is None else alike
             cells = _without_wall(cells, alike, grid)
-        return SurfaceRegion(plane=plane, cells=cells, colored=cells & alike, color=color, by_color=flush)
+        return SurfaceRegion(
+            plane=plane,
+            cells=cells,
+            colored=cells & alike,
+            color=color,
+            by_color=flush,
+            shadowed=shade is not None,
+        )
 
     def _region(
         self,
@@ -241,10 +255,20 @@ class SurfaceTracker:
         """
         colors, grid, flush = self._colors, picture.grid, _flush(cells, picture.inverse)
         alike = labels == BOARD if flush or colors.light is not None else alike_colors(picture.colors, color)
+        shade = shaded_samples(picture, plane.inverse_depth, cells, labels != OTHER, color)
+        if shade is not None:
+            alike, labels = alike | shade, np.where(shade, np.uint8(BOARD), labels)
         enclosed = flush and (by_color or colors.paint is not None)
         if enclosed:
             cells = _without_wall(cells, labels != OTHER, grid)
-        return SurfaceRegion(plane=plane, cells=cells, colored=cells & alike, color=color, by_color=enclosed)
+        return SurfaceRegion(
+            plane=plane,
+            cells=cells,
+            colored=cells & alike,
+            color=color,
+            by_color=enclosed,
+            shadowed=shade is not None,
+        )
 
 
 def _without_wall(cells: np.ndarray, alike: np.ndarray, grid: CoarseGrid) -> np.ndarray:

@@ -51,7 +51,7 @@ def vehicle_layer(
     shape = (scene.camera.height, scene.camera.width)
     picture, mask = np.zeros((*shape, 4), np.uint8), np.zeros(shape, np.uint8)
     inverse_depth, propellers = np.zeros(shape, np.float32), np.zeros(shape, np.uint8)
-    camera, to_camera = np.asarray(vehicle.camera_position_m), _to_camera(vehicle)
+    camera, turn = np.asarray(vehicle.camera_position_m), to_camera(vehicle)
     tip, base = np.asarray(vehicle.tip_position_m), np.asarray(vehicle.force_torque_position_m)
     ferrule = tip - np.array([BRUSH_LENGTH_M, 0.0, 0.0])
     color = np.array(brush_color(scene), float)
@@ -66,7 +66,7 @@ def vehicle_layer(
         slices.append((ferrule + (base - ferrule) * k / steps, vehicle.arm_radius_m, np.array(_ARM_COLOR, float)))
     fx, fy, cx, cy = intrinsics
     for center, radius, tone in slices:
-        x, y, z = to_camera @ (center - camera)
+        x, y, z = turn @ (center - camera)
         if z < _NEAR_M:
             continue
         place = (round((fx * x / z + cx) * _ONE), round((fy * y / z + cy) * _ONE))
@@ -76,13 +76,13 @@ def vehicle_layer(
         cv2.circle(inverse_depth, place, size, 1.0 / z, -1, cv2.LINE_8, _SHIFT)
     for hub, axis in zip(vehicle.geometry.positions, vehicle.geometry.axes, strict=True):
         rim = hub - camera + disc_rim(axis, vehicle.propeller_radius_m, _RIM_POINTS)
-        _fill(propellers, rim @ to_camera.T, intrinsics)
+        _fill(propellers, rim @ turn.T, intrinsics)
     return VehicleLayer(
         picture=picture, mask=mask, inverse_depth=inverse_depth, holes=_ragged_outline(mask, rng), propellers=propellers
     )
 
 
-def _to_camera(vehicle: VehicleParams) -> np.ndarray:
+def to_camera(vehicle: VehicleParams) -> np.ndarray:
     """Rotation from B to the axes of the camera, (3, 3)."""
     turn = rotation_from_vector(np.radians(vehicle.camera_turn_deg))
     return (turn @ R_BODY_CAMERA).T

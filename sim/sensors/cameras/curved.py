@@ -89,8 +89,8 @@ class CurvedCamera:
 
     def _holes(self, shape: tuple[int, ...], places: np.ndarray, cuts: list) -> list[np.ndarray]:
         """Flat indices of pixels without depth along the outline, from those of the flat picture."""
-        flat = self.finish.holes(cuts)
-        if not flat:
+        flat = [*self.finish.holes(cuts), self._flat.shiny]
+        if not any(len(places) for places in flat):
             return []
         mask = np.zeros(shape, np.uint8)
         mask.reshape(-1)[np.concatenate(flat)] = 1

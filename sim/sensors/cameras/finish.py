@@ -9,9 +9,14 @@ from ibvs_qp.config.vehicle import VehicleParams
 from sim.sensors.cameras.arm import clip_near, shade_propellers, vehicle_layer
 from sim.sensors.cameras.defects import CameraDefects
 from sim.sensors.cameras.noise import NoiseBank
+from sim.sensors.cameras.outdoor import Outdoor
 from sim.sensors.cameras.outline import Box, CutLine, cut_lines
 from sim.sensors.cameras.protocol import camera_intrinsics
-from sim.sensors.cameras.view import View
+from sim.sensors.cameras.view import View, board_steps
+from sim.sensors.cameras.weathering import Ground
+from sim.world.board import BoardGeometry
+from sim.world.canvas import TEXTURE_PAD_PX, Canvas
+from sim.world.errors import OutdoorErrors
 from sim.world.random_streams import stream
 from sim.world.scene import Scene
 
@@ -33,6 +38,7 @@ class PictureFinish:
     Attributes:
         intrinsics: (fx, fy, cx, cy) [px].
         defects: Errors of a real camera.
+        outdoor: Light, weather and lens outside, or None.
         propeller_box: (row, row end, column, column end) around the propellers visible in the colours, or None.
         arm_box: The same around arm and brush, or None; ``depth_box`` is theirs in the depth.
         arm: Colours of arm and brush, uint8 (H, W, 3), under the mask.
@@ -54,6 +60,9 @@ class PictureFinish:
         if self.noise and scene.errors.depth.noise_relative:
             self.noise.add_white_depth(scene.errors.depth.noise_relative, stream(seed, "depth noise"))
         self.defects = CameraDefects(scene, vehicle, self.intrinsics, seed)
+        self.outdoor = None
+        if scene.errors.outdoor != OutdoorErrors():
+            self.outdoor = Outdoor(scene.errors.outdoor, Ground.of(BoardGeometry(scene)), vehicle, shape, seed)
         layer = vehicle_layer(scene, vehicle, self.intrinsics, self.rng)
         seen, grown = self.defects.layer(layer), self.defects.depth.grown
         self.arm_box, self.propeller_box = _bounding_box(seen.mask), _bounding_box(seen.propellers)
@@ -76,6 +85,28 @@ class PictureFinish:
         height, width = self.mask.shape
         return cut_lines(polygon[:, :2] / polygon[:, 2:] * (fx, fy) + (cx, cy), width, height)
 
+    def go_outside(self, rgb: np.ndarray, view: View, canvas: Canvas) -> np.ndarray:
+        """Put surface and light outside into a drawn picture, uint8 (H, W, 3), in place.
+
+        Args:
+            rgb: Board and wall.
+            view: Pose of the camera.
+            canvas: The painted board.
+
+        Returns:
+            Flat indices of the pixels that wet paint leaves without depth.
+        """
+        if self.outdoor is None:
+            return np.zeros(0, np.intp)
+        painted = None
+        if self.outdoor.needs_paint:
+            coverage = canvas.painted
+            steps = board_steps(canvas.geometry, canvas.pixels_per_m, TEXTURE_PAD_PX)
+            size = rgb.shape[1::-1]
+            painted = cv2.warpPerspective(coverage, view.from_texture(*steps), size) / np.float32(255.0)
+        rgb[:] = np.clip(np.rint(self.outdoor.scene(rgb, view, painted)), 0.0, 255.0)
+        return self.outdoor.holes(painted)
+
     def color(self, rgb: np.ndarray, view: View, twist: np.ndarray | None, stamp_ns: int) -> np.ndarray:
         """A new picture from a drawn one: vehicle, lens blur, sensor noise.
 
@@ -93,6 +124,8 @@ class PictureFinish:
             r0, r1, c0, c1 = self.arm_box
             cv2.copyTo(self.arm[r0:r1, c0:c1], self.mask[r0:r1, c0:c1], rgb[r0:r1, c0:c1])
         self.defects.expose(rgb, stamp_ns, self._soft)
+        if self.outdoor is not None:
+            self._soft[:] = self.outdoor.lens(self._soft)
         return self.noise.add_color(self._soft) if self.noise else self._soft.copy()
 
     def holes(self, cuts: list[CutLine]) -> list[np.ndarray]:

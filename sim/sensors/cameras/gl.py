@@ -83,11 +83,12 @@ class GLCamera:
         if self._smooth_rim:
             for cut in cuts:
                 _mend_rim(self._rgb, cut)
+        shiny = self.finish.go_outside(self._rgb, view, self.canvas)
         common = self.finish.common_error(view)
         if common != 0.0:
             np.multiply(self._inverse, np.float32(1.0 / (1.0 + common)), out=self._inverse)
         color = self.finish.color(self._rgb, view, twist, stamp_ns)
-        depth = self.finish.depth(self._inverse, self.finish.holes(cuts))
+        depth = self.finish.depth(self._inverse, [*self.finish.holes(cuts), shiny])
         return RgbdFrame(rgb=color, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
     def close(self) -> None:

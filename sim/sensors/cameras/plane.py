@@ -71,7 +71,7 @@ class PlaneCamera:
         self._picture, self._behind = np.empty((*shape, 4), np.uint8), np.empty((*shape, 4), np.uint8)
         self._mask = np.zeros(shape, np.uint8)
         self.inverse, self._inverse_behind = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        self.drawn_rgb = np.empty((*shape, 3), np.uint8)
+        self.drawn_rgb, self.shiny = np.empty((*shape, 3), np.uint8), np.zeros(0, np.intp)
         self._v, self._u = np.indices(shape, np.float32)
 
     def capture(
@@ -85,11 +85,13 @@ class PlaneCamera:
         view = View.of_vehicle(position_ned, quaternion_b_in_i, self.vehicle.camera_position_m, self.intrinsics)
         cuts = self.draw(view, self.finish.common_error(view))
         rgb = self.finish.color(self.drawn_rgb, view, twist, stamp_ns)
-        depth = self.finish.depth(self.inverse, self.finish.holes(cuts))
+        depth = self.finish.depth(self.inverse, [*self.finish.holes(cuts), self.shiny])
         return RgbdFrame(rgb=rgb, depth=depth, intrinsics=self.intrinsics, stamp_ns=stamp_ns)
 
     def draw(self, view: View, common: float) -> list[CutLine]:
-        """Draw board and wall into `drawn_rgb` and `inverse`; returns the lines of the outline in the picture.
+        """Draw board and wall into `drawn_rgb` and `inverse`, and where wet paint has no depth into `shiny`.
+
+        Returns the lines of the outline in the picture.
 
         Args:
             view: Pose of the camera.
@@ -104,6 +106,7 @@ class PlaneCamera:
         for cut in cuts:
             self._cut(wall, cut)
         cv2.cvtColor(self._picture, cv2.COLOR_RGBA2RGB, self.drawn_rgb)
+        self.shiny = self.finish.go_outside(self.drawn_rgb, view, self.canvas)
         return cuts
 
     def _draw(self, sheet: _Sheet, box: Box, picture: np.ndarray, inverse: np.ndarray) -> None:

@@ -38,7 +38,7 @@ HARSH = {
 #: Fields that shape an error but are no size.
 SHAPES = {"attitude.wander_time_s", "rotors.noise_time_s", "depth.baseline_m"}
 #: Sections of `field` alone.
-OUTSIDE = ("air.", "arm.", "brush.", "relief.")
+OUTSIDE = ("air.", "arm.", "brush.", "outdoor.", "relief.")
 
 
 def flat(errors: WorldErrors) -> dict[str, Any]:

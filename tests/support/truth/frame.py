@@ -13,7 +13,7 @@ from ibvs_qp.vision.picture.camera import RgbdCamera
 from sim.sensors.cameras.arm import vehicle_layer
 from sim.world.scene import CameraScene, Scene
 from tests.support.truth.device_depth import device_depth
-from tests.support.truth.picture import paint_picture
+from tests.support.truth.picture import fresh, outdoors, paint_picture, painted
 from tests.support.truth.range import measure_depth
 from tests.support.truth.scenes import TruthScene
 
@@ -47,13 +47,16 @@ class TruthFrame:
     )
 
 
-def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None) -> TruthFrame:
+def render_frame(
+    scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = None, plain: np.ndarray | None = None
+) -> TruthFrame:
     """Render a scene.
 
     Args:
         scene: The scene.
         stamp_ns: Time of capture.
         noise_seed: Seed of the noise for frames of one sequence; None takes the seed of the scene.
+        plain: Its `plain_picture`, if it is known.
 
     Raises:
         ValueError: For the vehicle's arm in the picture of a device: it is drawn in registered pictures only.
@@ -62,7 +65,8 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
         raise ValueError("a device takes no picture with the arm")
     rng = np.random.default_rng(np.random.SeedSequence([scene.seed if noise_seed is None else noise_seed, 0x6E6F]))
     width, height, _ = scene.camera
-    rgb = paint_picture(scene, rng)
+    outside = outdoors(scene)
+    rgb = paint_picture(scene, rng, outside, plain)
     mask, layer = np.zeros((height, width), bool), None
     if scene.arm:
         flight = Scene(camera=CameraScene(width=width, height=height))
@@ -76,6 +80,8 @@ def render_frame(scene: TruthScene, stamp_ns: int = 0, noise_seed: int | None = 
         depth = device_depth(scene, scene.device, rng)
         raw = RgbdFrame(rgb=rgb, depth=depth, intrinsics=scene.intrinsics, stamp_ns=stamp_ns)
         frame = RgbdCamera(scene.device.settings).picture(raw)
+    if outside is not None and fresh(scene):
+        depth.reshape(-1)[outside.holes(painted(scene))] = 0.0
     if layer is not None:
         depth[mask] = 1.0 / layer.inverse_depth[mask]
         depth[(layer.holes > 0) & ~mask] = 0.0

@@ -7,7 +7,10 @@ import functools
 import cv2
 import numpy as np
 
+from ibvs_qp.config.vehicle import VehicleParams
+from sim.sensors.cameras.outdoor import Outdoor
 from sim.world.clutter import clutter_board
+from sim.world.errors import OutdoorErrors
 from sim.world.textures import flat, shade, smooth_noise, wall_surface
 from tests.support.truth.device_picture import exposure_gain, through_device
 from tests.support.truth.scenes import TruthScene
@@ -20,8 +23,46 @@ _MODULES = 8
 _WALLS = 4
 
 
-def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
-    """Colours of board, strokes and wall with blur, shading and noise, uint8 (H, W, 3)."""
+def outdoors(scene: TruthScene) -> Outdoor | None:
+    """The effects outside of a scene, those of flights; None inside."""
+    if scene.outdoor == OutdoorErrors():
+        return None
+    width, height, _ = scene.camera
+    return Outdoor(scene.outdoor, scene.ground, VehicleParams(), (height, width), scene.seed)
+
+
+def paint_picture(
+    scene: TruthScene, rng: np.random.Generator, outside: Outdoor | None = None, plain: np.ndarray | None = None
+) -> np.ndarray:
+    """Colours of board, strokes and wall with blur, shading and noise, uint8 (H, W, 3).
+
+    Args:
+        scene: The scene.
+        rng: Source of the noise.
+        outside: Of `outdoors`.
+        plain: Of `plain_picture`, if it is known.
+    """
+    width = scene.camera[0]
+    picture = plain_picture(scene, rng) if plain is None else plain
+    if outside is not None:
+        picture = outside.scene(picture, scene.view, painted(scene) if fresh(scene) else None)
+    light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
+    picture = picture * light
+    kernel = _motion_kernel(scene.motion_px)
+    if kernel is not None:
+        picture = cv2.filter2D(picture, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+    # averaging over the pixel blurs by 1/sqrt(12) of it already
+    sigma = float(np.sqrt(max(scene.blur_px**2 - 1.0 / 12.0, 0.0)))
+    if sigma > 0.05:
+        picture = cv2.GaussianBlur(picture, (0, 0), sigma)
+    if outside is not None:
+        picture = outside.lens(np.asarray(picture, np.float32))
+    picture = picture + scene.noise * rng.standard_normal(picture.shape, np.float32)
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+
+def plain_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
+    """Colours of board, strokes and wall in even light, float32 (H, W, 3); arguments as for `paint_picture`."""
     width, height, _ = scene.camera
     textures = np.random.default_rng(np.random.SeedSequence([scene.seed, 0x7478]))
     wall = _warp(_wall(scene), scene, scene.gap_m)
@@ -34,18 +75,22 @@ def paint_picture(scene: TruthScene, rng: np.random.Generator) -> np.ndarray:
     picture = coverage * board + (1.0 - coverage) * wall
     if scene.device is not None:
         picture = through_device(picture, scene, SUPERSAMPLING) * np.float32(exposure_gain(scene, rng))
-    picture = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
-    light = np.linspace(1.0 - scene.shading, 1.0 + scene.shading, width, dtype=np.float32)[None, :, None]
-    picture = picture * light
-    kernel = _motion_kernel(scene.motion_px)
-    if kernel is not None:
-        picture = cv2.filter2D(picture, -1, kernel, borderType=cv2.BORDER_REPLICATE)
-    # averaging over the pixel blurs by 1/sqrt(12) of it already
-    sigma = float(np.sqrt(max(scene.blur_px**2 - 1.0 / 12.0, 0.0)))
-    if sigma > 0.05:
-        picture = cv2.GaussianBlur(picture, (0, 0), sigma)
-    picture = picture + scene.noise * rng.standard_normal(picture.shape, np.float32)
-    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+    return cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
+
+
+def fresh(scene: TruthScene) -> bool:
+    """Whether the strokes are wet; else they are of older paint, with rust and stains on it."""
+    return scene.outdoor.wet_gloss > 0.0 or scene.outdoor.wet_holes > 0.0
+
+
+def painted(scene: TruthScene) -> np.ndarray:
+    """Fraction of every pixel that strokes cover, float32 (H, W)."""
+    width, height, _ = scene.camera
+    cover = np.zeros((SUPERSAMPLING * height, SUPERSAMPLING * width), np.float32)
+    for (left, top, right, bottom), _ in scene.strokes:
+        corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+        np.maximum(cover, quad_coverage(scene, corners), out=cover)
+    return cv2.resize(cover, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def quad_coverage(scene: TruthScene, corners: np.ndarray) -> np.ndarray:

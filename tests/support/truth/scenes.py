@@ -7,6 +7,9 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
+from sim.sensors.cameras.view import View
+from sim.sensors.cameras.weathering import Ground
+from sim.world.errors import OutdoorErrors
 from tests.support.truth.devices import ORBBEC, REALSENSE_D435, Device
 
 #: RGB colours of boards and paints.
@@ -46,6 +49,7 @@ class TruthScene:
     device: Device | None = None  # the real camera that takes the pictures; None for an ideal, registered one
     # velocity [m/s] and angular velocity [rad/s] of the camera in its axes, for the rows of the device's shutter
     twist: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    outdoor: OutdoorErrors = field(default_factory=OutdoorErrors)  # light, weather, wet paint and lens
     seed: int = 0  # of textures, clutter and noise
 
     @property
@@ -58,6 +62,19 @@ class TruthScene:
     def corners(self) -> np.ndarray:
         """Corners of the board in order (right, down) [m], (4, 2)."""
         return 0.5 * np.array(self.size_m) * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+
+    @property
+    def view(self) -> View:
+        """The same pose for the cameras of flights: x into the wall, y right and z down from the board's middle."""
+        turn = self.rotation[:, [2, 0, 1]]
+        return View(turn, -turn.T @ self.translation, self.intrinsics)
+
+    @property
+    def ground(self) -> Ground:
+        """The board in these coordinates; its paint is that of the first stroke."""
+        paint = self.strokes[0][1] if self.strokes else PAINTS[self.seed % len(PAINTS)]
+        right, down = np.eye(2)
+        return Ground(self.corners[0], right, down, self.size_m, paint, self.wall_color)
 
     def edge_planes(self, corners: np.ndarray) -> list[np.ndarray]:
         """Interpretation planes (a, b, c) of a polygon's edges, its inside on their positive side."""
