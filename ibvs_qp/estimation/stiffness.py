@@ -27,8 +27,9 @@ MEAN = 1.0
 #: A push counts from so many standard deviations of its noise [-]: the noise of the regressor alone, for a minute in
 #: calm air, makes any wall look stiff.
 NOISE_SIGMAS = 3.0
-#: The stiffness is measured once the compliance is known to this part.
-KNOWN_PART = 0.5
+#: The stiffness is measured once the compliance is known to this part, or surely less than this many times the assumed
+#: one: a stiff wall moves the tip by less than the accelerometer's drift, and its compliance is never known to a half.
+KNOWN_PART, STIFF_PART = 0.5, 3.0
 #: The result is on the stiff side by so many standard deviations [-]: with an estimate below a third of the true
 #: stiffness the loop is unstable.
 STIFF_SIDE = 0.5
@@ -208,7 +209,8 @@ def stiffness(
     prior = 1.0 / COMPLIANCE_STD**2
     compliance = (product + prior / own.assumed_stiffness_n_m) / (weight + prior)
     deviation = 1.0 / ca.sqrt(weight + prior)
-    found = both(touching, deviation < KNOWN_PART * compliance)
+    stiff = compliance + deviation < STIFF_PART / own.assumed_stiffness_n_m
+    found = both(touching, either(deviation < KNOWN_PART * compliance, stiff))
     compliance = ca.fmax(compliance - STIFF_SIDE * deviation, ca.fmin(compliance, 1.0 / own.assumed_stiffness_n_m))
     compliance = ca.fmin(ca.fmax(compliance, 1.0 / own.stiffness_max_n_m), 1.0 / own.stiffness_min_n_m)
     known = either(signals.state("stiffness.known"), found)
