@@ -296,7 +296,7 @@ def shaded_samples(
 ) -> np.ndarray | None:
     """Samples of the surface in other light, where a shadow falls on it; None without a shadow.
 
-    Colour alone does not tell a shadow from a grey wall behind a white board, but that has a step of depth.
+    Colour alone does not separate a shadow from a grey wall behind a white board, but that has a step of depth.
 
     Args:
         picture: The picture.

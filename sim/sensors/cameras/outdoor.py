@@ -1,4 +1,4 @@
-"""Pictures outside: sunlight on the wall, the camera's exposure, and what `weathering` adds to surface and lens.
+"""Pictures outside: sunlight on the wall, the camera's exposure, and the weather of surface and lens (`weathering`).
 
 Everything is drawn from the seed and applied to a drawn picture from the geometry of the view: shadows of beams are
 fixed on the wall, the vehicle's own shadow and reflections move with it, drops and dust are fixed in the picture. The
@@ -34,7 +34,7 @@ _SHADE_TINT = np.array((1.0, 0.98, 0.95), np.float32)
 _DULL_RAD, _WET_RAD, _SUN_COLOR = (0.06, 0.14), 0.25, np.array((255.0, 250.0, 238.0), np.float32)
 #: Sky in wet paint away from the sun, fraction of the sun's part.
 _SKY = 0.3
-#: Fraction of the light that spinning propellers take of what a solid part takes; radius of hub over rotor distance.
+#: Fraction of the light that spinning propellers take of a solid part; radius of hub over rotor distance.
 _BLADES, _HUB_SHARE = 0.4, 0.25
 #: Radius of an arm of the vehicle [m], and points along the rim of a disc.
 _ARM_M, _RIM_POINTS = 0.011, 24

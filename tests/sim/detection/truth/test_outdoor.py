@@ -61,7 +61,7 @@ def test_wall_and_lens_keep_their_effects_and_the_own_shadow_moves() -> None:
 
     focal = flown(OutdoorErrors()).intrinsics[0]
     step = 0.04
-    for family, moves in (("beam shadow", True), ("own shadow", False)):
+    for family, moves in (("stains", True), ("own shadow", False), ("drops and dust", False)):
         before, behind = change(family, 0.0), change(family, step)
         # depth of the face: the tip's distance and the camera's way to it
         pixels = round(focal * step / (0.15 + VEHICLE.tip_position_m[0] - VEHICLE.camera_position_m[0]))
