@@ -100,7 +100,7 @@ class PushReport:
         rotors = " and ".join(
             f"{name} at its {side} limit of {n:.1f} N" for name, side, n in setpoints.limiting_rotors()
         )
-        derated = " (derated)" if setpoints.derated else ""
+        derated = " (lowered)" if setpoints.derated else ""
         return (
             f"reach {setpoints.push_reference:.1f} N of {asked}: {friction}, {rotors or 'no rotor at a limit'}{derated}"
         )

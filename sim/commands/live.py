@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import sys
 from pathlib import Path
@@ -65,13 +66,29 @@ class Live:
             raise ConfigError(f"--port {self.port} is refused: allowed is {_PORTS[0]} to {_PORTS[1]}")
         if self.json:
             raise ConfigError("--json is of --replay")
-        start = self._start()
+        if self.log is not None and not self.log.exists():
+            raise ConfigError(f"--log {self.log}: no such file")
         try:
             import viser  # noqa: F401
         except ModuleNotFoundError:
             raise ConfigError("live needs the extra live: pip install -c constraints.txt -e '.[live]'") from None
+        from rich.console import Console
+
+        from sim.flight.working import working
+
+        text = "Preparing the page; the first start compiles the programs, and takes about a minute ..."
+        with contextlib.ExitStack() as waiting:  # a terminal has the line at once, a file none
+            waiting.enter_context(working(Console(stderr=True, quiet=not sys.stderr.isatty()), text))
+            return self._serve(waiting)
+
+    def _serve(self, waiting: contextlib.ExitStack) -> int:
+        """Serve until Ctrl-C; `waiting` is closed once the page is ready."""
         from sim.live.server import FlightEnded, LiveServer
         from sim.live.site import open_server
+
+        def ready(address: str) -> None:
+            waiting.close()
+            print(f"ibvs-qp live: {address} (Ctrl-C ends it)", flush=True)
 
         if self.log is not None:
             from sim.live.log_scene import LoggedFlight, LogServer
@@ -79,11 +96,12 @@ class Live:
             flight = LoggedFlight(self.log)
             if flight.note:
                 print(f"ibvs-qp live: {flight.note}", file=sys.stderr)
-            LogServer(flight, open_server(self.host, self.port)).run(not self.no_open, _announce)
+            LogServer(flight, open_server(self.host, self.port)).run(not self.no_open, ready)
             return 0
+        start = self._start()
         server = open_server(self.host, self.port)
         try:
-            LiveServer(start, server, self.out or Path("runs/live"), not self.no_ghost).run(not self.no_open, _announce)
+            LiveServer(start, server, self.out or Path("runs/live"), not self.no_ghost).run(not self.no_open, ready)
         except FlightEnded as error:
             print(f"ibvs-qp: {error}", file=sys.stderr)
             return EXIT_INTERNAL
@@ -104,7 +122,10 @@ class Live:
         config = ibvs_qp.preset("qp") if preset is None else PilotConfig.from_toml(preset)
         if config.law != "qp":
             raise ConfigError(f"--preset {self.preset} is of the analytic law; live tunes the QP law")
-        press = None if self.press is None else PressJob(hold_s=self.press)
+        try:
+            press = None if self.press is None else PressJob(hold_s=self.press)
+        except ConfigError as error:
+            raise ConfigError(str(error).replace("hold_s", "--press")) from None
         start = Start(scene=scene, preset=config, seed=self.seed, features=self.features, press=press)
         flown = pilot_config(scene, start.options("qp"), config)
         check_job(scene, flown, self.features, None if press is None else press)
@@ -117,7 +138,7 @@ class Live:
         from sim.flight.closed_loop import ClosedLoop
         from sim.flight.working import working
         from sim.live.rows import LiveLoop
-        from sim.live.session import repeat
+        from sim.live.session import repeat, write_run
         from sim.live.session_file import SessionFile
         from sim.report.rundir import as_json
 
@@ -127,8 +148,6 @@ class Live:
             session = repeat(file, LiveLoop if self.out is None else ClosedLoop)
         again = session.file()
         if self.out is not None:
-            from sim.live.run_log import write_run
-
             write_run(self.out, session)
         session.close()
         same = (again.ticks, again.digest) == (file.ticks, file.digest)
@@ -137,9 +156,5 @@ class Live:
         if self.json:
             print(as_json({"schema": 1, "ticks": file.ticks, "changes": len(file.changes), "identical": True}))
         else:
-            print(f"{file.ticks} ticks and {len(file.changes)} changes: bit-identical")
+            print(f"{file.ticks} ticks and {len(file.changes)} change{'s' * (len(file.changes) != 1)}: bit-identical")
         return 0
-
-
-def _announce(address: str) -> None:
-    print(f"ibvs-qp live: {address} (Ctrl-C ends it)", flush=True)

@@ -16,15 +16,14 @@ from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.controller import HybridController
 from ibvs_qp.estimation.turned_camera import straightened
 from ibvs_qp.frames import rotation_from_quaternion
-from ibvs_qp.interfaces.log import read_log, replayed
-from ibvs_qp.interfaces.log.header import recorded_controller
 from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.supervision.assured import Assured
 from sim.evaluate.explanation import flown_config
 from sim.flight.flight_log import load_run
 from sim.flight.trace import Trace
 from sim.live.charts import Charts
-from sim.live.explaining import WhatIf, markdown
+from sim.live.explaining import WhatIf
+from sim.live.panel import Why
 from sim.live.rows import NUMBERS, READ
 from sim.live.scene import LiveScene
 from sim.live.site import address, guarded, open_browser, stop
@@ -90,6 +89,9 @@ class LoggedFlight:
         self._put("pitch", np.degrees(arrays["euler"][:, 1]))
 
     def _of_mcap(self, file: Path) -> None:
+        from ibvs_qp.interfaces.log import read_log, replayed  # needs the extra log
+        from ibvs_qp.interfaces.log.header import recorded_controller
+
         flight = read_log(file)
         flown = recorded_controller(flight.facts)
         law = flown.controller if isinstance(flown, Assured) else flown
@@ -148,18 +150,16 @@ class LogServer:
         self._flight, self._server = flight, server
         self._what_if = WhatIf(straightened(flight.config.controller))
         self._scene = LiveScene(server, flight.scene, flight.config, flight.seed)
-        vehicle, gui = flight.config.controller.vehicle, server.gui
-        self._limits = np.array(vehicle.thrust_min), np.array(vehicle.thrust_max)
-        last = len(flight.rows) - 1
+        gui, last = server.gui, len(flight.rows) - 1
         hint = f"Tick of the log; one is {flight.config.controller.tick_s:g} s."
         tick = gui.add_slider("tick", 0, last, 1, 0, hint=hint)
         if flight.note:
             gui.add_markdown(flight.note)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Why"):
-            self._why = gui.add_markdown("")
+            self._why = Why(gui, self._what_if, lambda each, act: each.on_update(guarded(lambda _: act())))
         with tabs.add_tab("Charts"):
-            charts = Charts(gui, flight.places, flight.limits, self._what_if.rotors, kept_s=math.inf)
+            charts = Charts(gui, flight.places, flight.limits, self._what_if.rotors, kept_s=math.inf, fork=False)
         charts.add(flight.rows[:: max(len(flight.rows) // _MOST_ROWS, 1)])
         charts.show()
         self.show(0)
@@ -169,11 +169,10 @@ class LogServer:
         """Show a tick, the last one for a later one."""
         flight = self._flight
         tick = min(max(tick, 0), len(flight.rows) - 1)
-        frame = {"row": flight.rows[tick], "ghost": None, "limits": self._limits, "running": False}
+        limits = self._what_if.limits(flight.points[tick])
+        frame = {"row": flight.rows[tick], "ghost": None, "limits": limits, "running": False}
         self._scene.show(frame, flight.places)
-        explained = self._what_if.explain(flight.points[tick])
-        head = f"**Tick {tick}, t = {flight.rows[tick, 0]:.3f} s**"
-        self._why.content = head + "\n\n" + markdown(explained, None, self._what_if.rotors)
+        self._why.explain(tick, flight.rows[tick, 0], flight.points[tick])
 
     def run(self, browser: bool, ready: Callable[[str], None]) -> None:
         """Serve until Ctrl-C."""

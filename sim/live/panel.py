@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import viser
 
-from ibvs_qp.config.errors import IbvsQpError, out_of_range
+from ibvs_qp.config.errors import ConfigError, IbvsQpError, out_of_range
 from ibvs_qp.config.gains import Gains, Weights
 from ibvs_qp.config.limits import LimitSettings
 from ibvs_qp.config.solver import SOLVERS, SolverSettings
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.model.inputs import RUN_TIME
 from ibvs_qp.pilot.painting.config import PaintingConfig
-from sim.live.disturbances import BUTTONS, faults
-from sim.live.explaining import WhatIf, markdown
+from sim.live.disturbances import BUTTONS, OF_ROTOR, faults
+from sim.live.explaining import WhatIf
 from sim.live.process import FASTEST, SLOWEST
 from sim.live.rows import KEPT_S
 from sim.live.session import CEILING, ceilings
@@ -44,6 +44,8 @@ _VIEWS = (
     ("analytic law (ghost)", "show_ghost", True, "The analytic law, flying the same seed."),
     ("attainable push", "show_reach", False, "Forces that the tip can hold, as a polytope."),
 )
+
+_BACK = "Time before now, of the rewind and of the explained tick."
 
 #: Sends a command to the flight.
 Send = Callable[..., None]
@@ -80,7 +82,7 @@ class Control:
     ) -> None:
         meta, self.name = field.metadata, name
         unit = f" [{meta['unit']}]" if meta["unit"] else ""
-        self._label = f"{field.name.removesuffix('_n').removesuffix('_m_s').replace('_', ' ')}{unit}"
+        self.caption = f"{field.name.removesuffix('_n').removesuffix('_m_s').replace('_', ' ')}{unit}"
         why = f" Why: {meta['why']}." if meta.get("why") else ""
         hint = f"{name}{unit}: {meta['doc']}.{why}"
         low, high = span or (meta.get("low", -math.inf), meta.get("high", math.inf))
@@ -88,17 +90,17 @@ class Control:
         self._low, self._least = low, low if low > 0.0 or not ranged else high * 10.0**-_RANGE
         self._decades = ranged and high / self._least >= _DECADES_FROM and (low > 0.0 or high >= _DECADES_FROM)
         if isinstance(value, bool):
-            self.handle: Any = gui.add_checkbox(self._label, value, hint=hint)
+            self.handle: Any = gui.add_checkbox(self.caption, value, hint=hint)
         elif self._decades:
-            self._label = self._label.removesuffix(unit)
+            self.caption = self.caption.removesuffix(unit)
             ends = math.log10(self._least), math.log10(high)
             self.handle = gui.add_slider(self._text(value), *ends, 0.01, self._shown(value), hint=hint)
         elif math.isfinite(low) and math.isfinite(high):
             step = 10.0 ** math.floor(math.log10((high - low) / _STEPS))
             shown = min(max(float(value), low), high)
-            self.handle = gui.add_slider(self._label, float(low), float(high), step, shown, hint=hint)
+            self.handle = gui.add_slider(self.caption, float(low), float(high), step, shown, hint=hint)
         else:
-            self.handle = gui.add_number(self._label, float(value), hint=hint)
+            self.handle = gui.add_number(self.caption, float(value), hint=hint)
 
     @property
     def value(self) -> Any:
@@ -119,7 +121,46 @@ class Control:
         return math.log10(max(value, self._least)) if self._decades else value
 
     def _text(self, value: float) -> str:
-        return f"{self._label} = {value:.4g}"
+        return f"{self.caption} = {value:.4g}"
+
+
+class Why:
+    """Explanation of a tick, as recorded and with one setting changed.
+
+    Args:
+        gui: Where it is added.
+        what_if: Explains ticks.
+        owned: Makes a handle an input, with the function that is called after a change.
+    """
+
+    def __init__(self, gui: viser.GuiApi, what_if: WhatIf, owned: Callable[[Any, Callable[[], None]], Any]) -> None:
+        self._what_if, self._point, self._head = what_if, None, ""
+        self._what = gui.add_dropdown("instead", what_if.names, initial_value=what_if.names[0])
+        self._factor = gui.add_slider(
+            "factor x 1", -_WHAT_IF_DECADES, _WHAT_IF_DECADES, 0.02, 0.0, hint="On its value at that tick, in decades."
+        )
+        self._text = gui.add_markdown("No tick is explained yet.")
+        for handle in (self._what, self._factor):
+            owned(handle, self.show)
+
+    def explain(self, tick: int, time_s: float, point: np.ndarray) -> None:
+        """Explain a tick."""
+        self._point, self._head = point, f"**Tick {tick}, t = {time_s:.3f} s**"
+        self.show()
+
+    def show(self) -> None:
+        """Show the tick with the setting chosen."""
+        factor, name, point = 10.0**self._factor.value, self._what.value, self._point
+        self._factor.label = f"factor x {factor:.3g}"
+        if point is None:
+            return
+        try:
+            value, flown, now = self._what_if.scaled(point, name, factor)
+            text = f"{self._head}, {name} = {value:.4g} (flown: {value / factor:.4g})\n\n"
+            text += self._what_if.markdown(point, now, flown)
+        except IbvsQpError as error:
+            text = f"{self._head}\n\n{error}"
+        self._text.content = text.replace("| ", "|\u00a0")  # tables have no gaps of their own
 
 
 class Panel:
@@ -147,9 +188,9 @@ class Panel:
         self._settings, self._controls = settings, dict[str, Control]()
         self._noticed: dict[int, float] = {}
         self._ticks = self._first = 0
-        self.tick_s, self._point = 0.004, None
         gui = server.gui
-        self._status = gui.add_markdown("Starting ...")
+        self._status, self._below = gui.add_markdown("Starting ..."), gui.add_markdown("")
+        self._reduction = self._refused = ""
         self._time()
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tune"):
@@ -167,7 +208,7 @@ class Panel:
             self._button("Save preset, session and log", self._save)
             self.saved = gui.add_markdown("Nothing is saved yet.")
         self._events = gui.add_markdown("")
-        self._lines: list[str] = []
+        self._lines: list[tuple[float, str]] = []
 
     # One writer.
 
@@ -210,7 +251,12 @@ class Panel:
             if not self._writes(event):
                 back()
                 return
-            _check(handle)
+            try:
+                _check(handle)
+            except ConfigError as error:
+                back()
+                self.refuse(str(error))
+                raise
             act()
             last[0] = handle.value
 
@@ -237,18 +283,14 @@ class Panel:
             send("rate", 10.0**rate.value)
 
         self._input(rate, pace)
-        self._back = self._input(
-            gui.add_slider(
-                "back [s]", 0.0, KEPT_S, 0.1, 0.0, hint="Time before now, of the rewind and of the explained tick."
-            )
-        )
+        self._back = self._input(gui.add_slider("back [s]", 0.0, KEPT_S, self._what_if.tick_s, 0.0, hint=_BACK))
         self._button(
             "Rewind and fork", lambda: send("rewind", self._cursor()),
             "Pause at that tick; from there the flight may go another way, beside the trace before.",
         )  # fmt: skip
 
     def _cursor(self) -> int:
-        return max(self._ticks - round(self._back.value / self.tick_s), self._first)
+        return max(self._ticks - round(self._back.value / self._what_if.tick_s), self._first)
 
     def _tune(self) -> None:
         gui = self._server.gui
@@ -280,48 +322,27 @@ class Panel:
 
     def _disturb(self) -> None:
         gui, rotors = self._server.gui, self._what_if.rotors
-        rotor = self._input(
-            gui.add_dropdown("rotor", rotors, initial_value=rotors[0], hint="Rotor that is lost or weak.")
-        )
         for label in BUTTONS:
-            self._button(label, lambda label=label: self._strike(label, rotor.value))
+            if label == OF_ROTOR[0]:
+                rotor = gui.add_dropdown("rotor", rotors, initial_value=rotors[0], hint="Rotor that is lost or weak.")
+                self._rotor = self._input(rotor)
+            self._button(label, lambda label=label: self._strike(label))
 
-    def _strike(self, label: str, rotor: str) -> None:
-        for values in faults(label, rotor):
+    def _strike(self, label: str) -> None:
+        for values in faults(label, self._rotor.value):
             self._change("fault", values)
 
     def _why(self) -> None:
-        gui = self._server.gui
         self._button(
             "Explain the tick", lambda: self._send("point", self._cursor()), "The tick that the slider back points at."
         )
-        self._what = gui.add_dropdown("instead", self._what_if.names, initial_value="weights.push")
-        self._factor = gui.add_slider(
-            "factor x 1", -_WHAT_IF_DECADES, _WHAT_IF_DECADES, 0.02, 0.0, hint="On its value at that tick, in decades."
-        )
-        self._text = gui.add_markdown(
-            "Pause, and explain a tick: fractions of the cost, prices of limits, lost wrench."
-        )
-        for handle in (self._what, self._factor):
-            self._input(handle, self.explain)
+        self._button(
+            "Last tick with an active limit", lambda: self._send("limited"),
+            "Pause, and move back to the newest tick with a rotor at its limit.",
+        )  # fmt: skip
+        self.why = Why(self._server.gui, self._what_if, self._input)
 
     # From the flight.
-
-    def explain(self, tick: int | None = None, point: np.ndarray | None = None) -> None:
-        """Explain a tick, or the last one explained with another value."""
-        if point is not None:
-            self._point, self._tick = point, tick
-        if self._point is None:
-            return
-        factor, name = 10.0**self._factor.value, self._what.value
-        self._factor.label = f"factor x {factor:.3g}"
-        head = f"**Tick {self._tick}, t = {(self._tick or 0) * self.tick_s:.3f} s**"
-        try:
-            value, flown, now = self._what_if.scaled(self._point, name, factor)
-            head += "" if now is flown else f", {name} = {value:.4g}"
-            self._text.content = head + "\n\n" + markdown(now, flown, self._what_if.rotors)
-        except IbvsQpError as error:
-            self._text.content = f"{head}\n\n{error}"
 
     def show_settings(self, settings: dict[str, Any]) -> None:
         """Show the settings in force."""
@@ -335,29 +356,57 @@ class Panel:
         self._settings |= {name: value for name, value in change["values"].items() if name in self._settings}
         for name in change["values"].keys() & self._controls.keys():
             self._controls[name].show(self._settings[name])
-        values = ", ".join(f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+        values = ", ".join(f"{self._named(name)} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
                            for name, value in change["values"].items())  # fmt: skip
-        self.note(f"tick {change['tick']}: {values} (acts after {waited} ticks)")
+        self.refuse("")
+        self.note(change["tick"] * self._what_if.tick_s, f"{values} (acts after {waited} ticks)")
+
+    def _named(self, name: str) -> str:
+        """A task's setting as its slider names it."""
+        return self._controls[name].caption if name in self._controls and "." not in name else name
 
     def refused(self, text: str, settings: dict[str, Any]) -> None:
         """A change was refused."""
-        self.note(f"refused: {text}")
+        self.refuse(text)
         self.show_settings(settings)
-        if (writer := self._writer) is not None and (client := self._server.get_clients().get(writer)) is not None:
-            self._notify(client, "Refused", text)
 
-    def note(self, text: str) -> None:
+    def rewound(self, time_s: float, settings: dict[str, Any]) -> None:
+        """The flight is at an earlier time."""
+        self.point_back(0.0)
+        self.show_settings(settings)
+        self.refuse("")
+        self._lines = [(at, text if at < time_s else f"~~{text.strip('~')}~~") for at, text in self._lines]
+        self.note(time_s, "back here; later lines are struck out, the trace before is dashed")
+
+    def point_back(self, time_s: float) -> None:
+        """Point at a tick so long before now."""
+        self._back.value = time_s
+
+    def note(self, time_s: float, text: str) -> None:
         """Show a line under the panel."""
-        self._lines = [*self._lines, text][-8:]
-        self._events.content = "\n".join(f"- {line}" for line in self._lines)
+        self._lines = [*self._lines, (time_s, text)][-8:]
+        self._events.content = "\n".join(f"- {at:.2f} s {line}" for at, line in self._lines)
+
+    def refuse(self, text: str) -> None:
+        """Show a refusal below the status, until the next change."""
+        self._refused = f"**Refused:** {text}" if text else ""
+        self._show_below()
+
+    def _show_below(self) -> None:
+        text = "\n\n".join(each for each in (self._reduction, self._refused) if each)
+        if self._below.content != text:
+            self._below.content = text
 
     def frame(self, frame: dict[str, Any], phase: str, state: str) -> None:
         """Show where the flight stands."""
         self._ticks, self._first = frame["ticks"], frame["first"]
         for time_s, kind, text in frame["events"]:
-            self.note(f"{time_s:.2f} s {kind}: {text}")
+            self.note(time_s, f"{kind}: {text}")
         flown = f"x {frame['speed']:.2f}" if frame["running"] else frame["over"] or "paused"
         late = f", {100.0 * frame['late']:.2f} % of ticks late" if frame["running"] else ""
-        status = f"**{frame['ticks'] * self.tick_s:.2f} s** {flown}, phase **{phase}**, supervisor **{state}**{late}"
+        time_s = frame["ticks"] * self._what_if.tick_s
+        status = f"**{time_s:.2f} s** {flown}, phase **{phase}**, supervisor **{state}**{late}"
         if self._status.content != status:
             self._status.content = status
+        self._reduction = frame["reduction"]
+        self._show_below()

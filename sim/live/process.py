@@ -18,14 +18,13 @@ import numpy as np
 
 from ibvs_qp.checked_law import CheckedLaw
 from ibvs_qp.config import ControllerConfig
-from ibvs_qp.config.errors import IbvsQpError, out_of_range
+from ibvs_qp.config.errors import ConfigError, IbvsQpError, out_of_range
 from ibvs_qp.model.inputs import setting_values
 from sim.live.camera_picture import packed_picture
 from sim.live.ghost import Ghost
-from sim.live.presets import changes_text
-from sim.live.rows import LiveLoop
+from sim.live.rows import KEPT_S, LiveLoop
 from sim.live.session import CEILING, Session
-from sim.live.session_file import Start
+from sim.live.session_file import Start, changes_text
 from sim.storage.atomic import write_text
 
 #: Frames per second of the clock [Hz]; of coverage and pictures among them [Hz].
@@ -78,7 +77,8 @@ class FlightProcess:
     """Executes commands and flies: `run` returns when the connection closes.
 
     Commands are tuples of a name and arguments, see the methods ``do_*``. Replies: ("frame", table), ("changed",
-    table), ("refused", text), ("rewound", tick, settings), ("point", ...), ("saved", text).
+    table), ("refused", text), ("rewound", tick, settings), ("point", tick, inputs), ("found", ticks ago, tick, inputs),
+    ("saved", text).
 
     Args:
         connection: To the server.
@@ -137,7 +137,9 @@ class FlightProcess:
 
     def do_run(self, running: bool) -> None:
         """Fly or pause."""
-        self._running = running and not self._over
+        if running and self._over:
+            raise ConfigError(f"the flight is over ({self._over}); rewind and fork")
+        self._running = running
         if not running:
             gc.collect()
         self._pace.anchor(self.session.ticks)
@@ -170,6 +172,13 @@ class FlightProcess:
         if len(self._recorder.rows(tick, tick + 1)):
             self._connection.send(("point", tick, self._recorder.point(tick)))
 
+    def do_limited(self) -> None:
+        """Pause, and send the newest tick with an active thrust limit."""
+        self.do_run(False)
+        if (tick := self._recorder.last_limited()) is None:
+            raise ConfigError(f"no thrust limit was active in the last {KEPT_S:g} s")
+        self._connection.send(("found", self.session.ticks - tick, tick, self._recorder.point(tick)))
+
     def do_save(self, folder: str) -> None:
         """Write the session and the preset with its changes."""
         path, pilot = Path(folder), self._loop.pilot
@@ -177,7 +186,7 @@ class FlightProcess:
         solver = dataclasses.replace(pilot.config.controller.solver, backend="python", name=self.session.qp.solver)
         flown = dataclasses.replace(self._law_config(), solver=solver)
         config = dataclasses.replace(pilot.config, controller=flown)
-        write_text(path / "preset.toml", changes_text(config, pilot.painter.config))
+        write_text(path / "preset.toml", changes_text(config, pilot.painter.config, self._settings()[CEILING]))
         self._connection.send(("saved", str(path), len(self.session.changes)))
 
     def _settings(self) -> dict[str, Any]:
@@ -197,10 +206,11 @@ class FlightProcess:
             ticks = session.ticks - self._speed_tick
             self._speed = max(ticks, 0) * loop.pilot.config.controller.tick_s / max(now - self._speed_s, 1e-9)
             self._speed_s, self._speed_tick = now, session.ticks
-        first = -(-self._sent // ROW_TICKS) * ROW_TICKS
-        rows = recorder.rows(first, session.ticks, ROW_TICKS) if session.ticks > first else recorder.rows(0, 0)
-        if len(rows):
-            self._sent = session.ticks
+        end = max(session.ticks // ROW_TICKS * ROW_TICKS, self._sent)
+        every, price = recorder.rows(self._sent, end), recorder.places["price"]
+        rows, self._sent = every[::ROW_TICKS].copy(), end
+        if len(rows):  # a limit that is active in one tick only is seen
+            rows[:, price] = np.maximum.reduceat(every[:, price], np.arange(0, len(every), ROW_TICKS))
         last = recorder.rows(session.ticks - 1, session.ticks)
         new, self._sent_events = recorder.events_since(self._sent_events), recorder.noted
         table: dict[str, Any] = {
@@ -215,6 +225,7 @@ class FlightProcess:
             "row": last[0] if len(last) else None,
             "ghost": self._ghost.pose if self._ghost is not None else None,
             "limits": loop.world.plant.thrust_limits,
+            "reduction": loop.pilot.push_report.reduction,
             "events": [(event.t, event.kind, event.text) for event in new],
         }
         if now >= self._next_picture_s:

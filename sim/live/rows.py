@@ -11,6 +11,7 @@ from ibvs_qp.controller import HybridController
 from ibvs_qp.measurement import FeatureFrame, SensorFrame
 from ibvs_qp.pilot import Pilot
 from ibvs_qp.pilot.painting.strategy import PHASES
+from ibvs_qp.symbolic.signals import places
 from sim.flight.closed_loop import ClosedLoop
 from sim.flight.options import FlightOptions, ticks_in
 from sim.flight.recorder import Recorder
@@ -23,6 +24,8 @@ from sim.world.scene import Scene
 KEPT_S = 60.0
 #: Most events of the pilot that are kept [-].
 MOST_EVENTS = 200
+#: A thrust this near to a limit is at it [N].
+NEAR_N = 0.05
 STATES, OUTCOMES = tuple(str(each) for each in SafetyState), tuple(str(each) for each in Outcome)
 _STATE, _OUTCOME = ({each: index for index, each in enumerate(kind)} for kind in (SafetyState, Outcome))
 _PHASE = {phase: index for index, phase in enumerate(PHASES)}
@@ -48,6 +51,9 @@ class LiveRecorder(Recorder):
         law, rotors = pilot.controller, pilot.config.controller.vehicle.geometry.count
         self.limits: tuple[str, ...] = law.problem.row_names if isinstance(law, HybridController) else ()
         self._limit = {name: index for index, name in enumerate(self.limits)}
+        if isinstance(law, HybridController):
+            self._bounds = places(law.problem.model.signals.inputs)
+            self._thrusts = [self._limit[f"thrust_{name}"] for name in law.config.vehicle.geometry.names]
         widths = {**dict.fromkeys(NUMBERS, 1), **READ, "thrusts": rotors, "actual": rotors, "price": len(self.limits)}
         ends = np.cumsum([0, *widths.values()]).tolist()
         self.places = {name: slice(*ends[index : index + 2]) for index, name in enumerate(widths)}
@@ -104,6 +110,16 @@ class LiveRecorder(Recorder):
         """Inputs and states of a tick's program; of the last tick where it is not kept."""
         tick = min(max(tick, self.ticks - self.capacity, 0), max(self.ticks - 1, 0))
         return self._points[tick % self.capacity].copy()
+
+    def last_limited(self) -> int | None:
+        """Newest tick of the last `KEPT_S` with a rotor at a thrust limit that has a price; None without."""
+        first = max(self.ticks - self.capacity, 0)
+        place = np.arange(first, self.ticks) % self.capacity
+        thrusts, prices = (self._rows[place][:, self.places[name]] for name in ("thrusts", "price"))
+        low, high = (self._points[place][:, self._bounds[name]] for name in ("thrust_low", "thrust_high"))
+        at_limit = (thrusts < low + NEAR_N) | (thrusts > high - NEAR_N)  # others are at the rate limit
+        found = np.flatnonzero((at_limit & (prices[:, self._thrusts] > 0.0)).any(axis=1))
+        return first + int(found[-1]) if len(found) else None
 
     def back_to(self, ticks: int, events: list[Event]) -> None:
         """Forget later ticks."""

@@ -22,6 +22,7 @@ from ibvs_qp.pilot import PilotConfig
 from ibvs_qp.quaternion import multiply
 from sim.live.camera_picture import picture_of
 from sim.live.process import PAINT_PX_M
+from sim.live.rows import NEAR_N
 from sim.live.site import guarded
 from sim.world.board import BoardGeometry
 from sim.world.mjcf import build_model
@@ -39,8 +40,6 @@ _BLADES = (90, 90, 100, 255), (60, 60, 70, 255)
 _EVERY = 3
 #: The arrows are drawn this far above the tip, beside the brush [m].
 _ABOVE_M = 0.07
-#: A thrust this near to a limit is at it [N].
-_NEAR_N = 0.05
 #: Turn of a rotor per frame and newton of thrust [rad/N]: slow enough for the frames.
 _SPIN = 0.06
 #: First view: from behind to the right; direction from the target, and distances that show this radius [m].
@@ -318,7 +317,7 @@ class LiveScene:
         points, colors = [], []
         for index, (hub, up) in enumerate(zip(self._hubs, self._ups, strict=True)):
             side = 0.04 * np.cross(up, [1.0, 0.0, 0.0])
-            at_limit = min(thrusts[index] - lower[index], upper[index] - thrusts[index]) < _NEAR_N
+            at_limit = min(thrusts[index] - lower[index], upper[index] - thrusts[index]) < NEAR_N
             points.append((hub, hub + THRUST_M_N * thrusts[index] * up))
             colors.append([_AT_LIMIT if at_limit else _THRUST] * 2)
             for bound in (lower[index], upper[index]):

@@ -63,6 +63,7 @@ class LiveServer:
             process.start()
         for other in others:  # each process ends with the one that it serves
             other.close()
+        self._waiting = server.gui.add_markdown("Preparing the flight ...")
         self._sending, self._closed = threading.Lock(), threading.Event()
         self._log: subprocess.Popen[bytes] | None = None
         self._status_s = self._charts_s = 0.0
@@ -126,12 +127,12 @@ class LiveServer:
         config = pilot_config(start.scene, start.options("qp"), start.config("qp"))
         self._places, self._tick_s = places, config.controller.tick_s
         server, what_if = self._server, WhatIf(straightened(config.controller))
+        self._waiting.remove()
         self._scene = LiveScene(server, start.scene, config, start.seed)
         view = functools.partial(setattr, self._scene)
         self._panel = Panel(server, self._send, settings, what_if, self._save, view)
-        self._panel.tick_s = self._tick_s
         with self._panel.charts_tab:
-            self._charts = Charts(server.gui, places, limits, what_if.rotors)
+            self._charts = Charts(server.gui, places, limits, what_if.rotors, path=start.press is None)
 
     def _send(self, *command: Any) -> None:
         with self._sending:
@@ -181,21 +182,25 @@ class LiveServer:
 
     def _on_rewound(self, tick: int, settings: dict[str, Any]) -> None:
         self._charts.rewind(tick * self._tick_s)
-        self._panel.show_settings(settings)
-        self._panel.note(f"back at tick {tick}: the trace before is dashed")
+        self._panel.rewound(tick * self._tick_s, settings)
 
     def _on_point(self, tick: int, point: np.ndarray) -> None:
-        self._panel.explain(tick, point)
+        self._panel.why.explain(tick, tick * self._tick_s, point)
+
+    def _on_found(self, back: int, tick: int, point: np.ndarray) -> None:
+        self._panel.point_back(back * self._tick_s)
+        self._on_point(tick, point)
 
     def _on_saved(self, folder: str, changes: int) -> None:
         if self._log is not None:  # two clicks before the first reply
-            self._panel.note(f"{folder} has no log: that of the save before is being flown")
+            self._panel.refuse(f"{folder} has no log: that of the save before is being flown")
             return
         command = [sys.executable, "-m", "sim.commands.cli", "live", "--replay", f"{folder}/session.json", "--out"]
         command.append(f"{folder}/run")
         self._log = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # nosec B603
+        count = f"{changes} change{'s' * (changes != 1)}"
         self._panel.saved.content = (
-            f"`{folder}`: session.json ({changes} changes) and preset.toml. The log is being flown again from it ..."
+            f"`{folder}`: session.json ({count}) and preset.toml. The log is being flown again from it ..."
         )
 
     def _check_log(self) -> None:
@@ -206,7 +211,7 @@ class LiveServer:
 
     def _save(self) -> None:
         if self._log is not None:
-            self._panel.note("refused: the log of the save before is being flown; save after it")
+            self._panel.refuse("the log of the save before is being flown; save after it")
             return
         stamp = time.strftime("%Y-%m-%dT%H-%M-%S", time.gmtime())
         self._send("save", str(self._out / f"{stamp}-{next(self._folders)}"))

@@ -6,12 +6,13 @@ import dataclasses
 import hashlib
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from ibvs_qp.config.errors import ConfigError, out_of_range, shown
-from ibvs_qp.config.settings import adjusted, from_dict
+from ibvs_qp.config.settings import adjusted, dump_toml, from_dict
 from ibvs_qp.config.solver import SOLVERS
 from ibvs_qp.config.vehicle import VehicleParams
 from ibvs_qp.controller import HybridController
@@ -21,11 +22,13 @@ from ibvs_qp.qp.problem import ProgramData
 from sim.faults.kinds import KINDS
 from sim.faults.rotors import RotorFault
 from sim.flight.closed_loop import ClosedLoop
+from sim.flight.flight_log import save_log
 from sim.flight.options import ticks_in
 from sim.flight.trace import Event
 from sim.live.rows import KEPT_S, LiveLoop
 from sim.live.session_file import Change, SessionFile, Start
 from sim.live.snapshot import Blocks, WorldState
+from sim.storage.atomic import write_text
 
 #: Time between snapshots [s].
 SNAPSHOT_S = 1.0
@@ -337,3 +340,14 @@ def repeat(file: SessionFile, kind: type[ClosedLoop] = LiveLoop) -> Session:
     while session.ticks < file.ticks and session.going:
         session.step()
     return session
+
+
+def write_run(folder: Path, session: Session) -> None:
+    """Write scene and log of a session that was flown with the whole log.
+
+    Raises:
+        UnwritableFile: When the system does not let it.
+    """
+    trace = session.qp.loop.trace()
+    write_text(folder / "scene.toml", dump_toml(trace.scene))
+    save_log(folder / "log.npz", {"qp": trace})

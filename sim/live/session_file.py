@@ -1,4 +1,4 @@
-"""Session file: the beginning of a flight and its changes with their ticks; it repeats the flight."""
+"""Session file: the beginning of a flight and its changes with their ticks; it repeats the flight. And its preset."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ibvs_qp.config.errors import ConfigError, shown
 from ibvs_qp.config.files import UnreadableFile, parse_toml
 from ibvs_qp.config.settings import from_dict, to_dict
 from ibvs_qp.pilot import PilotConfig
+from ibvs_qp.pilot.painting.config import PaintingConfig
 from sim.flight.jobs import Job, PaintJob, PressJob
 from sim.flight.options import FlightOptions
 from sim.storage.arrays import read_json
@@ -20,6 +21,7 @@ from sim.storage.atomic import write_text
 from sim.world.scene import Scene
 
 SCHEMA = 1
+_HEAD = "# Changes against the shipped preset; every other value has its default."
 #: Longest session that is read [ticks], and most changes in it [-].
 MOST_TICKS, MOST_CHANGES = 10_000_000, 100_000
 
@@ -137,3 +139,43 @@ def _count(value: Any, most: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
         raise ValueError(f"{value!r} is no whole number from 0 to {most}")
     return value
+
+
+def changed_keys(table: dict[str, Any], base: dict[str, Any]) -> dict[str, Any]:
+    """Keys of a table whose values differ from another's, section by section."""
+    changed: dict[str, Any] = {}
+    for name, value in table.items():
+        if isinstance(value, dict) and isinstance(base.get(name), dict):
+            if inner := changed_keys(value, base[name]):
+                changed[name] = inner
+        elif value != base.get(name):
+            changed[name] = value
+    return changed
+
+
+def changes_text(config: PilotConfig, task: PaintingConfig, thrust_max_n: float) -> str:
+    """A preset of the changes alone: every key that differs from its default; `PilotConfig.from_toml` reads it.
+
+    Args:
+        config: The configuration.
+        task: The paint job flown: its push and speed belong to the scene, and stand in comments.
+        thrust_max_n: Upper thrust limit of the session [N], which a preset does not hold.
+    """
+    import tomli_w
+
+    base = to_dict(PilotConfig(law=config.law), derived=True)
+    table = changed_keys(to_dict(config), base)
+    for name in ("painting", "vision"):  # follow from the scene
+        table.pop(name, None)
+    controller = table.get("controller", {})
+    for section in ("vehicle", "solver"):  # calibration of the scene's camera; the machine's backend
+        calibrated = {"camera_size_px", "camera_intrinsics_px", "backend"}
+        kept = {name: value for name, value in controller.pop(section, {}).items() if name not in calibrated}
+        if kept:
+            controller[section] = kept
+    if not controller:
+        table.pop("controller", None)
+    job = f"# The scene's [paint]: push_n = {task.push_n:g}, speed_m_s = {task.speed_m_s:g}"
+    lowered = thrust_max_n < config.controller.vehicle.thrust_max.max()
+    limit = [f"# The thrust limit of {thrust_max_n:g} N is in session.json alone."] if lowered else []
+    return "\n".join([_HEAD, job, *limit, "", tomli_w.dumps(table)])

@@ -48,7 +48,7 @@ def guarded(
         try:
             act(*values)
         except Exception as error:
-            ignored(f"{type(error).__name__}: {error}")
+            ignored(str(error) if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}")
             if undo is not None:
                 undo()
 

@@ -19,7 +19,7 @@ from ibvs_qp.qp.explain import Explanation
 from sim.evaluate.explanation import flown_config
 from sim.evaluate.window import phase_window
 from sim.flight.trace import Trace
-from sim.live.explaining import CEILING, WhatIf, markdown
+from sim.live.explaining import CEILING, WhatIf
 from sim.notebook.common import BLUE, RED
 from sim.notebook.tuning import save_setting
 from sim.notebook.wall_flights import Setting
@@ -77,7 +77,7 @@ class RecordedTicks:
             return "", f"{head}\n\n**Refused:** {error}"
         ceiling = self._what_if.ceiling(point)
         words = f"{head}, **{name} = {value:.4g}** (flown: {value / factor:.4g})"
-        text = markdown(now, flown, self._what_if.rotors)
+        text = self._what_if.markdown(point, now, flown)
         drawn = self._bars(flown, now, value if name == CEILING else ceiling, ceiling)
         return drawn, f"{words}\n\n{text}"
 

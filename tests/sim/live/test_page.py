@@ -125,7 +125,7 @@ def test_the_page_draws_and_every_control_acts(live, tmp_path):
     page.enter("back", 0.3)
     then = page.time_s
     page.press("Rewind and fork")
-    wait_for("rewind", lambda: "back at tick" in page.text and page.time_s < then)
+    wait_for("rewind", lambda: "back here" in page.text and page.time_s < then)
 
     page.tab("Why")
     page.press("Explain the tick")

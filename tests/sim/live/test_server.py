@@ -70,10 +70,10 @@ def test_a_flight_that_dies_is_exit_code_1_and_one_line(serve):
     [
         (["--port", "80"], "--port"),
         (["--host", "no.such.host.invalid"], "cannot listen"),
-        (["--press", "-1"], "hold_s"),
+        (["--press", "-1"], "--press"),
         (["--preset", "tarot_t960_paper"], "analytic"),
         (["--replay", "nothing.json"], "nothing.json"),
-        (["--log", "nothing.mcap"], "nothing.mcap"),
+        (["--log", "nothing.mcap"], "no such file"),
         (["--json"], "--json"),
     ],
 )
