@@ -150,7 +150,7 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
 
 
 def _outermost(lines: list[Candidate], pixel: float) -> list[Candidate]:
-    """The lines, best first; a border beside one farther out, where the surface surely ends, is no sure one.
+    """The lines, best first; a border beside one farther out, where the surface certainly ends, is no sure one.
 
     Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well. A
     pixel of a picture 640 wide is given normalised.
