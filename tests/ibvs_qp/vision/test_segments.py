@@ -14,7 +14,7 @@ from ibvs_qp.vision.lines.borders import places_beside, ways_aside
 from ibvs_qp.vision.lines.segments import edge_segments
 from ibvs_qp.vision.picture.layout import PictureLayout
 from ibvs_qp.vision.picture.picture import Picture
-from sim.detection import segments as every_segment
+from sim.detection import own as every_segment
 
 
 def two_tone(angle: float) -> np.ndarray:
