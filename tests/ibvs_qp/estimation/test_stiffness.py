@@ -83,6 +83,16 @@ def test_stiffness_of_a_press_in_gusts(k_wall: float) -> None:
     assert min(values) > 0.75 * k_wall  # too soft is what makes a contact ring
 
 
+def test_a_wall_that_is_certainly_stiff_is_known_and_a_soft_one_is_not_taken_for_it() -> None:
+    """Known at the value assumed, or nearer; a soft one only at its own stiffness."""
+    for seed in range(6):
+        value, known = found(press(8000.0, seed, gust=0.7, seconds=30.0))
+        assert known and 0.5 * 8000.0 < value < 3.0 * 8000.0
+    for seconds in (0.5, 1.0, 2.0, 4.0, 8.0):
+        value, known = found(press(1500.0, gust=0.7, seconds=seconds))
+        assert not known or value < 3.0 * 1500.0, seconds
+
+
 def test_in_calm_air_the_touch_tells_and_the_error_is_on_the_stiff_side() -> None:
     values = [found(press(1500.0, seed))[0] for seed in range(6)]
     assert 0.75 * 1500.0 < min(values) and np.median(values) < ASSUMED
