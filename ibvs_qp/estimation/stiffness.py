@@ -28,8 +28,8 @@ MEAN = 1.0
 #: calm air, makes any wall look stiff.
 NOISE_SIGMAS = 3.0
 #: The stiffness is measured once the compliance is known to this part, or certainly less than this many times the
-#: assumed one: a stiff wall moves the tip by less than the accelerometer's drift, and its compliance is never known to a
-#: half.
+#: assumed one: a stiff wall moves the tip by less than the accelerometer's drift, and its compliance is never known to
+#: a half.
 KNOWN_PART, STIFF_PART = 0.5, 3.0
 #: The result is on the stiff side by so many standard deviations [-]: with an estimate below a third of the true
 #: stiffness the loop is unstable.
