@@ -27,9 +27,9 @@ MEAN = 1.0
 #: A push counts from so many standard deviations of its noise [-]: the noise of the regressor alone, for a minute in
 #: calm air, makes any wall look stiff.
 NOISE_SIGMAS = 3.0
-#: The stiffness is measured once the compliance is known to this part, or certainly less than this many times the
-#: assumed one: a stiff wall moves the tip by less than the accelerometer's drift, and its compliance is never known to
-#: a half.
+#: The stiffness is measured once the compliance is known to this part. A stiff wall moves the tip by less than the
+#: accelerometer's drift, and its compliance is never known to a half: it counts as measured while its compliance, one
+#: deviation added, is positive and less than this many times the assumed one, from half the prior deviation on.
 KNOWN_PART, STIFF_PART = 0.5, 3.0
 #: The result is on the stiff side by so many standard deviations [-]: with an estimate below a third of the true
 #: stiffness the loop is unstable.
@@ -210,11 +210,12 @@ def stiffness(
     prior = 1.0 / COMPLIANCE_STD**2
     compliance = (product + prior / own.assumed_stiffness_n_m) / (weight + prior)
     deviation = 1.0 / ca.sqrt(weight + prior)
-    stiff = compliance + deviation < STIFF_PART / own.assumed_stiffness_n_m
-    found = both(touching, either(deviation < KNOWN_PART * compliance, stiff))
+    found = both(touching, deviation < KNOWN_PART * compliance)
+    most = compliance + deviation
+    stiff = both(touching, most > 0.0, most < STIFF_PART / own.assumed_stiffness_n_m, deviation < 0.5 * COMPLIANCE_STD)
     compliance = ca.fmax(compliance - STIFF_SIDE * deviation, ca.fmin(compliance, 1.0 / own.assumed_stiffness_n_m))
     compliance = ca.fmin(ca.fmax(compliance, 1.0 / own.stiffness_max_n_m), 1.0 / own.stiffness_min_n_m)
     known = either(signals.state("stiffness.known"), found)
     old = signals.state("stiffness.value", start=own.assumed_stiffness_n_m)
     value = signals.remember("stiffness.value", where(touching, 1.0 / compliance, old))
-    return Stiffness(value, signals.remember("stiffness.known", known))
+    return Stiffness(value, either(signals.remember("stiffness.known", known), stiff))  # the next place may be soft

@@ -150,9 +150,9 @@ _FIGURES = (
     Figure(
         "completed", "completed", "Whether the job was done, by the true motion and not by the report of the pilot.",
         lambda p: p.not_completed is None, better=MORE,
-        exactly="by the truth: every stroke *at its place*, its length within 1 cm, contact in 98 % of painting (90 % "
-        "with gusts or in the harsh world), retreat, no crash, no time-out. A press: every phase of its plan. A row: "
-        "its stroke at its place and of its length",
+        exactly="by the truth: every stroke *at its place*, its length within 1 cm, no hole, contact in 98 % of "
+        "painting (90 % with gusts or in the harsh world), retreat, no crash, no time-out. A press: every phase of its "
+        "plan. A row: its stroke at its place and of its length",
     ),
     Figure(
         "claimed", "claimed by the pilot", "Whether the pilot reported so; a flight where both differ has failed.",

@@ -62,8 +62,9 @@ def painted_strokes(trace: Trace) -> dict[int, Stroke]:
         if not len(path):
             before = None
             continue
-        line = averaged(path)
         second = tip[again & (trace.row == number)]
+        filled = second[~np.isin((second[:, 0] // BIN_M), (path[:, 0] // BIN_M))]  # holes of the first pass
+        line = averaged(np.concatenate((path, filled)))
         inner, outer = _band(line, second)
         straight = (np.abs(line[:, 0] - first) > CORNER_M) & (np.abs(line[:, 0] - last) > CORNER_M)
         error = line[straight if straight.any() else slice(None), 1] - place

@@ -21,6 +21,8 @@ PLACE_M = 0.008
 MOST_OVERLAP = 3.0
 #: Largest error of the length of a stroke [m].
 LENGTH_M = 0.01
+#: A hole in a stroke is longer than half the brush's width, which a round brush covers but for slivers, by this [m].
+HOLE_M = 0.01
 #: Rounding of the tip's place: strokes that touch may differ by it [m].
 ROUNDING_M = 1e-6
 #: Least contact while painting, and in gusts or in the harsh world.
@@ -141,8 +143,8 @@ class Assessment:
             )
         if abs(stroke.length_m - paint.stroke_m) > LENGTH_M:
             yield f"{stroke.length_m:.3f} m long, {paint.stroke_m:.3f} m asked"
-        if stroke.hole_m > paint.brush_width_m:
-            yield f"a hole: no contact over {_mm(stroke.hole_m)}, brush {_mm(paint.brush_width_m)} wide"
+        if stroke.hole_m > (limit := 0.5 * paint.brush_width_m + HOLE_M):
+            yield f"a hole: no contact over {_mm(stroke.hole_m)}, limit {_mm(limit)}"
 
     def _retreat(self) -> Iterator[str]:
         trace = self.trace

@@ -37,8 +37,8 @@ A paint job is completed if
   cover of the round brush, with the paint of phase `retouch`) touches or overlaps that of the row
   before everywhere but in the last {end:.0f} cm, by at most {most:g} times the nominal overlap. Nominal lines count
   from the board's edge, independent of the rows before, so errors add up;
-- every row has its length within {length:.0f} cm, and no way without contact longer than the brush is wide. Only
-  paint on the board counts;
+- every row has its length within {length:.0f} cm, and no hole: no way without contact that is longer than half the
+  brush's width and {hole:.0f} cm. Only paint on the board counts;
 - the brush touches in {contact:.0f} % of the painting time, {rough:.0f} % with gusts or in the harsh world;
 - the tip ends at least {away:.0f} cm from the board, without a crash and without a time-out.
 
@@ -79,6 +79,7 @@ def metrics_page() -> str:
         "end": 100.0 * END_M,
         "most": truth.MOST_OVERLAP,
         "length": 100.0 * truth.LENGTH_M,
+        "hole": 100.0 * truth.HOLE_M,
         "contact": 100.0 * truth.CONTACT,
         "rough": 100.0 * truth.ROUGH_CONTACT,
         "away": 100.0 * truth.DETACHED_M,

@@ -49,14 +49,15 @@ class Painter(Strategy):
         super().adjust(push_n, speed_m_s)
         if self.phase in ("paint", "retouch"):
             self._way_s *= before / self.config.speed_m_s
-        self._tip.config = self.config
+        self._tip.config = self._held.config = self.config
 
     def reset(self) -> None:
         """As after construction."""
         super().reset()
         self._tip = tip = Navigation(self.config)
         self._stroke = Stroke(self.config, tip.cross, tip.along, number=1, place=self.config.edge_margin_m)
-        self._alignment, self._stroke_end, self._held = Alignment(self.config), StrokeEnd(self.config), HeldTip()
+        self._alignment, self._stroke_end = Alignment(self.config), StrokeEnd(self.config)
+        self._held = HeldTip(self.config)
         self._last_time = self._standoff = math.nan
         self._way_s = 0.0  # time of the way in this phase, added to the time-out [s]
         self._since = math.inf  # time of the touch in press, and of the arrival in climb and search [s]
@@ -69,6 +70,7 @@ class Painter(Strategy):
         """Advance by one tick."""
         dt = 0.0 if math.isnan(self._last_time) else inputs.time_s - self._last_time
         self._last_time = inputs.time_s
+        self._held.ease(dt)
         self.log += self._tip.update(inputs, dt, self.phase, self._stroke)
         if inputs.time_s - self.entered > self.config.timeout_s + self._way_s and self.phase not in _UNTIMED:
             self._time_out(inputs)
@@ -91,7 +93,8 @@ class Painter(Strategy):
     def _enter(self, inputs: PainterInput, phase: str, reason: str) -> None:
         config, stroke, tip = self.config, self._stroke, self._tip
         self.enter(inputs, phase, reason)
-        self._since, self._held = math.inf, HeldTip()
+        self._since = math.inf
+        self._held.release()
         if phase != "retouch":
             stroke.back_to = math.nan
         u, v = stroke.way
@@ -277,7 +280,7 @@ class Painter(Strategy):
         self._speed = ramped(self._speed, target, config.acceleration_m_s2 * dt)
         if remaining <= STOP_DISTANCE:
             self._speed = 0.0
-        self._held.update(config, self._speed, stroke.direction * tip.along.step, dt)
+        self._held.watch(self._speed, stroke.direction * tip.along.step, dt)
         self._lead_to_end(remaining, dt)
         return self._stroke_end.is_reached(inputs, remaining) and not self._paused
 
@@ -288,9 +291,9 @@ class Painter(Strategy):
         """
         tip, before = self._tip, self._follows_end
         self._follows_end = tip.mark is not None and remaining <= LEAD_M and not self._stroke.goes_back
-        if self._follows_end and not before:
+        if self._follows_end and (not before or self._held.rests):
             tip.u_reference = tip.along.u
-        if self._follows_end and not self._paused:
+        if self._follows_end and not self._paused and not self._held.rests:
             step = max(self._speed, END_SPEED) * dt
             tip.u_reference = approached(tip.u_reference, self._stroke.goal, step)
 

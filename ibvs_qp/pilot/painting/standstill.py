@@ -6,17 +6,17 @@ import math
 
 from ibvs_qp.pilot.painting.command import PainterInput
 from ibvs_qp.pilot.painting.config import PaintingConfig
-from ibvs_qp.pilot.painting.speed import clipped
+from ibvs_qp.pilot.painting.speed import approached
 
 #: Remaining distance at which the commanded speed becomes zero [m]; speed at a stop over `align_speed_m_s` [-].
 STOP_DISTANCE, STOP_SPEED_RATIO = 0.002, 2.0
 #: Averaging time of the speed of the tip [s]; part of the commanded speed below which it is held [-], for so long [s]:
 #: friction alone holds a tip at the beginning of a stroke for 0.3 s; slowest command that counts, over the speed of the
 #: job [-].
-HELD_AVERAGE_S, HELD_RATIO, HELD_PATIENCE_S, LEAST_COMMAND = 0.1, 0.2, 0.25, 0.5
-#: Push against an obstacle over that of the job [-], its rate [1/s], the rest before the tip goes on [s], until drive
-#: and push have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
-EASED_PUSH, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 2.0, 0.8, 0.05
+HELD_AVERAGE_S, HELD_RATIO, HELD_PATIENCE_S, LEAST_COMMAND = 0.1, 0.2, 0.4, 0.5
+#: Push against an obstacle over that of the job [-], at least [N], and its rate [1/s]; the rest before the tip goes on
+#: [s], until drive and push have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
+EASED_PUSH, LEAST_PUSH_N, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 1.0, 2.0, 0.8, 0.05
 
 
 class StrokeEnd:
@@ -83,30 +83,42 @@ class Alignment:
 class HeldTip:
     r"""Eases the push of a tip that an obstacle holds: the tip rests, and passes it with a part of the push.
 
-    The force along the wall that takes a tip over a flank of angle a is :math:`f \tan(a + \arctan \mu)`, 1.9 times the
+    The force along the wall that takes a tip over a flank of angle a is :math:`f \tan(a + \arctan \mu)`, twice the
     push f at 28 deg and friction 0.7. While the tip is held, drive along the wall and push hold each other: less push
     alone frees no tip, and one that frees itself under full drive is thrown along the wall.
 
     Attributes:
         push: Over the push of the job [-].
         rests: Whether the tip waits for drive and push to fall.
+        config: Push and speed of the job.
+
+    Args:
+        config: Push and speed of the job.
     """
 
-    def __init__(self) -> None:
-        self.push, self.rests = 1.0, False
-        self._speed = self._held_s = self._eased_s = 0.0
+    def __init__(self, config: PaintingConfig) -> None:
+        self.config, self.push = config, 1.0
+        self.release()
+
+    def release(self) -> None:
+        """The tip no longer moves along the stroke; its push rises to that of the job."""
+        self.rests, self._speed, self._held_s, self._eased_s = False, 0.0, 0.0, 0.0
         self._way = math.inf  # since the tip was held [m]
 
-    def update(self, config: PaintingConfig, commanded: float, moved: float, dt: float) -> None:
+    def watch(self, commanded: float, moved: float, dt: float) -> None:
         """Speed that is commanded along the stroke [m/s], and the move of the tip in its direction [m]."""
         if dt <= 0.0:
             return
         self._speed += (1.0 - math.exp(-dt / HELD_AVERAGE_S)) * (moved / dt - self._speed)
-        slow = self._speed < HELD_RATIO * commanded and commanded > LEAST_COMMAND * config.speed_m_s
+        slow = self._speed < HELD_RATIO * commanded and commanded > LEAST_COMMAND * self.config.speed_m_s
         self._held_s = self._held_s + dt if slow else 0.0
         self._eased_s, self._way = self._eased_s + dt, self._way + max(moved, 0.0)
         if self._held_s > HELD_PATIENCE_S and not self.rests:
             self._eased_s = self._way = 0.0
-        eased = self._way < EASED_WAY_M
-        self.rests = eased and self._eased_s < EASED_REST_S
-        self.push = clipped(self.push + (-EASE_1_S if eased else EASE_1_S) * dt, EASED_PUSH, 1.0)
+        self.rests = self._way < EASED_WAY_M and self._eased_s < EASED_REST_S
+
+    def ease(self, dt: float) -> float:
+        """Push of the next tick over that of the job [-]."""
+        least = min(1.0, max(EASED_PUSH, LEAST_PUSH_N / self.config.push_n))
+        self.push = approached(self.push, least if self._way < EASED_WAY_M else 1.0, EASE_1_S * dt)
+        return self.push

@@ -29,8 +29,8 @@ UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 ASIDE_M = 0.002
 #: Most of the time of painting without contact [-], below this push [N].
 MOST_LOST, LOST_N = 0.02, 0.3
-#: Length of the pieces of a stroke that have felt the brush or not [m].
-PIECE_M = 0.005
+#: Length of the pieces of a stroke that have felt the brush or not [m]: more than one tick's way at 0.5 m/s.
+PIECE_M = 0.0025
 #: Last part of a stroke, whose overlap does not count [m].
 CORNER_M = 0.02
 #: Standard deviations at which a stroke is at its place, leaves no gap, and overlaps no more than allowed [-].
@@ -187,9 +187,9 @@ class Stroke:
         self.painted_s += dt
         if inputs.in_contact:
             self.behind = max(self.behind, -self.travel * self.along.moved)
-        if inputs.push > LOST_N:
+        if inputs.push > LOST_N and inputs.in_contact:  # a sample of the force sensor alone may be noise
             self._felt[self._piece(self.along.u)] = True
-        else:
+        if inputs.push <= LOST_N:
             self.lost_s += dt
 
     def _hole(self) -> tuple[float, float]:
@@ -224,16 +224,17 @@ class Stroke:
         least = overlap - RETOUCH_SIGMAS * np.hypot(known, self.cross.misfit)
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self.certain_m)]
-        hole = self._hole()
+        hole, gap = self._hole(), bool(gaps.size)
         gaps = np.concatenate((gaps, np.array(hole)[np.isfinite(hole)]))
         if not gaps.size or self.retouches >= MOST_RETOUCHES or self.cross.longest_unled > MOST_UNLED_M:
             return ""
         first = float(gaps.min() if self.travel > 0.0 else gaps.max())
         before = max(self.travel * (first - self.begin) - RETOUCH_BEFORE_M, TURN_BEFORE_M)
         self.retouches, self.back_to = self.retouches + 1, self.begin + self.travel * before
-        short, way = -float(least.min(initial=0.0)), abs(self.along.u - self.back_to)
-        gap = f"row {self.number} may leave a gap of {short * 1e3:.1f} mm"
-        return f"{gap if short > 0.0 else self._without_contact(hole)}, back by {way:.2f} m"
+        way, flaw = abs(self.along.u - self.back_to), self._without_contact(hole)
+        if gap:
+            flaw = f"row {self.number} may leave a gap of {-float(least.min()) * 1e3:.1f} mm"
+        return f"{flaw}, back by {way:.2f} m"
 
     def doubt(self, by_edge: bool) -> str:
         """Why the stroke that has ended, with the edge there in view or not, is not claimed; empty where it is."""

@@ -90,11 +90,14 @@ class StrokeMap:
         return stroke
 
     def widened(self, again: StrokeMap) -> StrokeMap:
-        """Outermost line of this stroke and of one painted over it: v is the larger one where both lie."""
+        """Outermost line of this stroke and of one painted over it: v is the larger one where both lie.
+
+        In a hole of this one it is that of the other.
+        """
         wide = copy.deepcopy(self)
         for place, (total, count) in enumerate(zip(again._sum, again._count, strict=True)):
             own = self._count[place]
-            if count and own and total * own > self._sum[place] * count:
+            if count and (not own or total * own > self._sum[place] * count):
                 wide._sum[place], wide._count[place] = total, count
         return wide
 
@@ -155,15 +158,15 @@ class Strokes:
         Returns:
             u, and overlap on the safe side and largest overlap of all passes, less the brush's width [m], (n,) each.
         """
-        (u, last), (_, own) = self.complete[-1].places(), self.passes[0][0].places()
+        u, last = self.complete[-1].places()
+        inner = np.fmin.reduce([farthest_out.places()[1] for _, farthest_out in self.passes])
+        innermost = np.fmin.reduce([found.places()[1] for found, _ in self.passes])
         low, high = sorted((first_u, last_u))
-        within = (low <= u) & (u <= high) & np.isfinite(last - own)
+        within = (low <= u) & (u <= high) & np.isfinite(last - innermost)
 
         def edge(v: np.ndarray, side: int) -> np.ndarray:
             painted, found = np.isfinite(v), np.full(v.size, math.nan)
             found[painted] = band_edge(u[painted], v[painted], self._radius, side)
             return found[within]
 
-        inner = np.fmin.reduce([farthest_out.places()[1] for _, farthest_out in self.passes])
-        innermost = np.fmin.reduce([found.places()[1] for found, _ in self.passes])
         return u[within], edge(last, 1) - edge(inner, -1), edge(last, 1) - edge(innermost, -1)

@@ -93,6 +93,17 @@ def test_a_wall_that_is_certainly_stiff_is_known_and_a_soft_one_is_not_taken_for
         assert not known or value < 3.0 * 1500.0, seconds
 
 
+def test_a_stiff_wall_is_known_no_longer_where_it_is_soft() -> None:
+    block, depth = press(8000.0, gust=0.7, seconds=30.0), 0.0
+    assert found(block)[1]
+    for number in range(2500):
+        lever = 0.03 * np.sin(12.0 * number * TICK)
+        depth += TICK * lever
+        block(push=1000.0 * depth + 5.0, acceleration=0.0, lever_speed=lever, variance=0.01**2, touching=1.0, felt=1.0)
+    value, known = found(block)
+    assert not known or value < 3000.0
+
+
 def test_in_calm_air_the_touch_tells_and_the_error_is_on_the_stiff_side() -> None:
     values = [found(press(1500.0, seed))[0] for seed in range(6)]
     assert 0.75 * 1500.0 < min(values) and np.median(values) < ASSUMED

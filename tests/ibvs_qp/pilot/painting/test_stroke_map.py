@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ibvs_qp.pilot.painting.stroke_map import BEYOND_M, BIN_M, StrokeMap, band_edge
+from ibvs_qp.pilot.painting.stroke_map import BEYOND_M, BIN_M, StrokeMap, Strokes, band_edge
 
 
 def straight_map(first: float = 0.0, last: float = 0.6, slope: float = 0.1, length: float = 0.6) -> StrokeMap:
@@ -51,7 +51,7 @@ def test_paint_beside_the_nominal_stroke_is_remembered_and_farther_away_ignored(
     assert math.isnan(stroke.mean(-BEYOND_M - 0.1, -BEYOND_M - 0.1))
 
 
-def test_a_widened_map_is_the_outermost_of_both_where_both_lie() -> None:
+def test_a_widened_map_is_the_outermost_of_both_and_has_no_hole_where_one_lies() -> None:
     first, again = StrokeMap(0.3), StrokeMap(0.3)
     for u, v in ((0.105, 0.05), (0.115, 0.05), (0.125, 0.05)):
         first.add(u, v)
@@ -59,7 +59,7 @@ def test_a_widened_map_is_the_outermost_of_both_where_both_lie() -> None:
         again.add(u, v)
     wide = first.widened(again)
     assert [wide.mean(u, u) for u in (0.105, 0.115, 0.125)] == pytest.approx([0.052, 0.05, 0.05])
-    assert math.isnan(wide.mean(0.205, 0.205))
+    assert wide.mean(0.205, 0.205) == pytest.approx(0.06) and math.isnan(wide.mean(0.305, 0.305))
     assert first.mean(0.105, 0.105) == pytest.approx(0.05)
 
 
@@ -102,3 +102,18 @@ def test_a_round_brush_fills_a_dip_from_both_sides_and_widens_no_line(side: int)
     filled = radius - math.sqrt(radius**2 - 0.025**2)
     assert (side * band_edge(u, dip, radius, side)).min() == pytest.approx(-filled, abs=1e-9)
     assert (side * band_edge(u, -dip, radius, side)).max() == pytest.approx(0.02)
+
+
+def test_a_pass_over_a_hole_has_an_overlap_there() -> None:
+    strokes = Strokes(0.6, 0.04)
+    strokes.begin_pass()
+    for u in np.arange(0.0, 0.6, 0.002):
+        strokes.add(float(u), 0.05)
+    strokes.end_stroke()
+    for low, high in ((0.0, 0.2), (0.1, 0.5)):  # the second pass lies 12 mm farther out
+        strokes.begin_pass()
+        for u in np.arange(low, high, 0.002):
+            strokes.add(float(u), 0.122 if low == 0.0 else 0.134)
+    u, overlap, _ = strokes.overlap(0.0, 0.6)
+    assert u.max() > 0.48
+    assert overlap[(u > 0.25) & (u < 0.45)] == pytest.approx(0.05 - 0.134, abs=1e-6)
