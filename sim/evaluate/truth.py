@@ -21,7 +21,7 @@ PLACE_M = 0.008
 MOST_OVERLAP = 3.0
 #: Largest error of the length of a stroke [m].
 LENGTH_M = 0.01
-#: A hole in a stroke is longer than half the brush's width, which a round brush covers but for slivers, by this [m].
+#: A hole in a stroke is longer than half the brush's width, which a round brush covers except for slivers, by this [m].
 HOLE_M = 0.01
 #: Rounding of the tip's place: strokes that touch may differ by it [m].
 ROUNDING_M = 1e-6
