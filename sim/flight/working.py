@@ -6,15 +6,13 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from sim.flight.jobs import PaintJob
-from sim.flight.options import FlightOptions, pilot_config
-from sim.flight.trace import law_name
-from sim.world.board import BoardGeometry
-from sim.world.scene import Scene
+if TYPE_CHECKING:
+    from sim.world.scene import Scene
 
 #: Time to the first line and between two [s]: together less than 10 s, as one kind of work follows another. The line of
 #: an error in an option or a file comes before the first.
@@ -94,6 +92,12 @@ def flight_progress(
     Yields:
         A function of law, simulated time [s], phase and real-time factor.
     """
+    # Here, since the first line of a command must not wait for them.
+    from sim.flight.jobs import PaintJob
+    from sim.flight.options import FlightOptions, pilot_config
+    from sim.flight.trace import law_name
+    from sim.world.board import BoardGeometry
+
     notes = dict.fromkeys(laws, "starting")
     if not console.is_terminal:
         with lines(console, lambda: "; ".join(f"{law_name(law)}: {note}" for law, note in notes.items())):

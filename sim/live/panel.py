@@ -253,11 +253,11 @@ class Panel:
                 return
             try:
                 _check(handle)
+                act()
             except ConfigError as error:
                 back()
                 self.refuse(str(error))
                 raise
-            act()
             last[0] = handle.value
 
         handle.on_update(guarded(update, back))

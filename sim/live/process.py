@@ -174,9 +174,9 @@ class FlightProcess:
 
     def do_limited(self) -> None:
         """Pause, and send the newest tick with an active thrust limit."""
-        self.do_run(False)
         if (tick := self._recorder.last_limited()) is None:
             raise ConfigError(f"no thrust limit was active in the last {KEPT_S:g} s")
+        self.do_run(False)
         self._connection.send(("found", self.session.ticks - tick, tick, self._recorder.point(tick)))
 
     def do_save(self, folder: str) -> None:
