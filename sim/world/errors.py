@@ -176,7 +176,7 @@ class ReliefErrors(Checked):
 
 @dataclass(frozen=True, kw_only=True)
 class OutdoorErrors(Checked):
-    """Pictures outside, drawn from the seed; an effect has between half of its size and all of it."""
+    """Pictures outside, drawn from the seed; shade, glare, exposure, low light and gloss: half their size to all."""
 
     beams: int = setting(0, "shadows of beams across the board", low=0, high=20)
     beam_shade: float = _size("light that the shadow of a beam takes", "", 0.9)

@@ -142,21 +142,25 @@ class Plant(PlantReadings):
             mujoco.mj_kinematics(self.model, self.data)
             tip, ahead = self.data.geom_xpos[self._ids.tip], self.data.geom_xmat[self._ids.tip][::3]
             self.truth[_TIP] = FLIP * (tip + TIP_RADIUS_M * ahead)
-        if self._touch.rough:
-            self._read_rough_contact()
-        if surface.flat:
+        if surface.flat and not self._touch.rough:
             return
         chart = surface.chart(self.truth[_TIP])
-        self.truth[_FRICTION] = self.truth[_FRICTION] @ surface.axes(chart)
-        self.truth[_TIP] = chart
+        axes = surface.axes(chart)
+        if self._touch.rough:
+            self._read_rough_contact(FLIP * axes[:, 0])
+        if not surface.flat:
+            self.truth[_FRICTION] = self.truth[_FRICTION] @ axes
+            self.truth[_TIP] = chart
 
-    def _read_rough_contact(self) -> None:
+    def _read_rough_contact(self, normal: np.ndarray) -> None:
         """Push and friction of a relief: the whole contact force along the normal of the wall, and the rest of it.
 
         The contact of a slope has another normal, and its friction a share in the push.
+
+        Args:
+            normal: Unit vector into the wall, in MuJoCo's world, (3,).
         """
-        surface = self._board.surface
-        start, normal = self._ids.remembered[3], FLIP * surface.axes(surface.chart(self.truth[_TIP]))[:, 0]
+        start = self._ids.remembered[3]
         samples = self.data.history[start : start + CONTACT_NUMBERS * self._steps].reshape(self._steps, -1)
         found, forces, first, second = samples[:, :1], samples[:, 1:4], samples[:, 4:7], samples[:, 7:10]
         axes = np.stack((first, second, np.cross(first, second)), axis=1)

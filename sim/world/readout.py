@@ -25,7 +25,7 @@ READINGS = {
     "tip": 3,  # world [m]; `Plant` replaces it by its chart, and friction by its parts there
     "felt": 3,  # specific force in B, mean of the tick [m/s^2]
     "ft_wrench": 6,  # vehicle on tool, FRD, at the last physics step [N, N m]
-    "push": 1,  # normal contact force at the last physics step [N]
+    "push": 1,  # contact force into the wall at the last physics step [N]; of a relief set by `Plant`
     "friction": 3,  # on the tip along the wall, world, at the last physics step [N]
     "depth": 1,  # of the body origin below the ground, < 0 above it [m]
     "sink": 1,  # velocity of the body origin downwards [m/s]

@@ -10,10 +10,12 @@ from ibvs_qp.pilot.painting.speed import approached
 
 #: Remaining distance at which the commanded speed becomes zero [m]; speed at a stop over `align_speed_m_s` [-].
 STOP_DISTANCE, STOP_SPEED_RATIO = 0.002, 2.0
-#: Averaging time of the speed of the tip [s]; part of the commanded speed below which it is held [-], for so long [s]:
-#: friction alone holds a tip at the beginning of a stroke for 0.3 s; slowest command that counts, over the speed of the
-#: job [-].
-HELD_AVERAGE_S, HELD_RATIO, HELD_PATIENCE_S, LEAST_COMMAND = 0.1, 0.2, 0.4, 0.5
+#: Averaging time of the speed of the tip [s]; part of the commanded speed below which it is held [-]; slowest command
+#: that counts, over the speed of the job [-].
+HELD_AVERAGE_S, HELD_RATIO, LEAST_COMMAND = 0.1, 0.2, 0.5
+#: A tip is held after so long [s]: after 0.4 s one at a rivet has freed itself before its push has fallen. One that has
+#: not slid yet is held after so long [s]: friction alone holds it for 0.3 s at the beginning of a stroke.
+HELD_PATIENCE_S, START_PATIENCE_S = 0.25, 0.6
 #: Push against an obstacle over that of the job [-], at least [N], and its rate [1/s]; the rest before the tip goes on
 #: [s], until drive and push have fallen, and the way over the obstacle [m]: of a rivet, and as much again.
 EASED_PUSH, LEAST_PUSH_N, EASE_1_S, EASED_REST_S, EASED_WAY_M = 0.35, 1.0, 2.0, 0.8, 0.05
@@ -102,7 +104,8 @@ class HeldTip:
 
     def release(self) -> None:
         """The tip no longer moves along the stroke; its push rises to that of the job."""
-        self.rests, self._speed, self._held_s, self._eased_s = False, 0.0, 0.0, 0.0
+        self.rests = self._slid = False
+        self._speed = self._held_s = self._eased_s = 0.0
         self._way = math.inf  # since the tip was held [m]
 
     def watch(self, commanded: float, moved: float, dt: float) -> None:
@@ -113,12 +116,12 @@ class HeldTip:
         slow = self._speed < HELD_RATIO * commanded and commanded > LEAST_COMMAND * self.config.speed_m_s
         self._held_s = self._held_s + dt if slow else 0.0
         self._eased_s, self._way = self._eased_s + dt, self._way + max(moved, 0.0)
-        if self._held_s > HELD_PATIENCE_S and not self.rests:
+        self._slid = self._slid or (commanded > 0.0 and self._speed > LEAST_COMMAND * commanded)
+        if self._held_s > (HELD_PATIENCE_S if self._slid else START_PATIENCE_S) and not self.rests:
             self._eased_s = self._way = 0.0
         self.rests = self._way < EASED_WAY_M and self._eased_s < EASED_REST_S
 
-    def ease(self, dt: float) -> float:
-        """Push of the next tick over that of the job [-]."""
+    def ease(self, dt: float) -> None:
+        """Move the push by one tick [s]: down while the tip passes an obstacle, up otherwise."""
         least = min(1.0, max(EASED_PUSH, LEAST_PUSH_N / self.config.push_n))
         self.push = approached(self.push, least if self._way < EASED_WAY_M else 1.0, EASE_1_S * dt)
-        return self.push

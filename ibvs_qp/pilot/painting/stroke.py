@@ -187,13 +187,13 @@ class Stroke:
         self.painted_s += dt
         if inputs.in_contact:
             self.behind = max(self.behind, -self.travel * self.along.moved)
-        if inputs.push > LOST_N and inputs.in_contact:  # a sample of the force sensor alone may be noise
-            self._felt[self._piece(self.along.u)] = True
         if inputs.push <= LOST_N:
             self.lost_s += dt
+        elif inputs.in_contact:  # a sample of the force sensor alone may be noise
+            self._felt[self._piece(self.along.u)] = True
 
-    def _hole(self) -> tuple[float, float]:
-        """First and last u of the longest way without contact that leaves a hole [m]; both NaN without one.
+    def _hole(self) -> tuple[float, float] | None:
+        """First and last u of the longest way without contact that leaves a hole [m]; None without one.
 
         The brush covers half its width from both sides; beyond an end there is no other side.
         """
@@ -204,7 +204,7 @@ class Stroke:
         inner = (holes[:, 0] > half) & (holes[:, 1] < len(felt) - half)
         size[size <= np.where(inner, half, round(LENGTH_TOLERANCE_M / PIECE_M))] = 0
         if not size.any():
-            return math.nan, math.nan
+            return None
         begin, end = (first + holes[np.argmax(size)]) * PIECE_M
         return float(begin), float(end)
 
@@ -224,17 +224,16 @@ class Stroke:
         least = overlap - RETOUCH_SIGMAS * np.hypot(known, self.cross.misfit)
         enough = RETOUCH_OVERLAP * self.config.overlap_m > RETOUCH_SIGMAS * known
         gaps = u[(least < 0.0) & enough & (SIGMAS * known <= 2.0 * self.certain_m)]
-        hole, gap = self._hole(), bool(gaps.size)
-        gaps = np.concatenate((gaps, np.array(hole)[np.isfinite(hole)]))
+        hole = self._hole()
+        gap = f"row {self.number} may leave a gap of {-float(least.min()) * 1e3:.1f} mm" if gaps.size else ""
+        gaps = np.concatenate((gaps, hole or ()))
         if not gaps.size or self.retouches >= MOST_RETOUCHES or self.cross.longest_unled > MOST_UNLED_M:
             return ""
         first = float(gaps.min() if self.travel > 0.0 else gaps.max())
         before = max(self.travel * (first - self.begin) - RETOUCH_BEFORE_M, TURN_BEFORE_M)
         self.retouches, self.back_to = self.retouches + 1, self.begin + self.travel * before
-        way, flaw = abs(self.along.u - self.back_to), self._without_contact(hole)
-        if gap:
-            flaw = f"row {self.number} may leave a gap of {-float(least.min()) * 1e3:.1f} mm"
-        return f"{flaw}, back by {way:.2f} m"
+        flaw = gap or self._without_contact(hole or (math.nan, math.nan))
+        return f"{flaw}, back by {abs(self.along.u - self.back_to):.2f} m"
 
     def doubt(self, by_edge: bool) -> str:
         """Why the stroke that has ended, with the edge there in view or not, is not claimed; empty where it is."""
@@ -250,7 +249,7 @@ class Stroke:
             return f"row {row} is painted over {painted * 1e3:.0f} mm, {asked * 1e3:.0f} mm were asked"
         if along.slip > config.gates.stop_m:
             return f"row {row} met an edge {along.slip * 1e3:.0f} mm from where the odometer expected it"
-        if not math.isnan((hole := self._hole())[0]):
+        if hole := self._hole():
             return self._without_contact(hole)
         if self.is_last and self.lost_s > MOST_LOST * self.painted_s:
             return f"the strokes were without contact for {self.lost_s:.1f} s of {self.painted_s:.1f} s"

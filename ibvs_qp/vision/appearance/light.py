@@ -65,15 +65,21 @@ def in_other_light(ones, twos, dot):
     return 1.0 - dot * dot / (ones * twos) < gate * gate
 
 
+@inner
+def is_shaded(one, color):
+    """Whether a colour (3,) is another (3,) in sun or in shadow."""
+    dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
+    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
+    twos = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
+    return in_other_light(ones, twos, dot)
+
+
 @kernel("b1[::1](f8[:, ::1], f8[::1])")
 def _shaded(colors, color):
     """Whether colours (n, 3) are a colour (3,) in sun or shadow, (n,)."""
     found = np.empty(len(colors), np.bool_)
-    own = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
     for k in range(len(colors)):
-        red, green, blue = colors[k, 0], colors[k, 1], colors[k, 2]
-        dot = red * color[0] + green * color[1] + blue * color[2]
-        found[k] = in_other_light(red * red + green * green + blue * blue, own, dot)
+        found[k] = is_shaded(colors[k], color)
     return found
 
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from ibvs_qp.vision.appearance.colors import BOARD, PAINT, SurfaceColors, is_alike
-from ibvs_qp.vision.appearance.light import in_other_light
+from ibvs_qp.vision.appearance.light import in_other_light, is_shaded
 from ibvs_qp.vision.compilation import inner, kernel
 from ibvs_qp.vision.lines.refine import RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
@@ -313,14 +313,6 @@ def _light_changes(one, two):
 
 
 @inner
-def _is_shaded(one, color):
-    """Whether a colour (3,) is another in sun or in shadow."""
-    dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
-    ones, twos = one[0] ** 2 + one[1] ** 2 + one[2] ** 2, color[0] ** 2 + color[1] ** 2 + color[2] ** 2
-    return in_other_light(ones, twos, dot)
-
-
-@inner
 def _read_color(rgb, mask, u, v, nx, ny, distances, colors, inside):
     """Colour at growing distances from a place, the border's beyond the picture; whether nothing hides it."""
     height, width = mask.shape
@@ -344,7 +336,7 @@ def _ends_here(inner_states, outer_states, inner_colors, outer_colors, inside, c
     """
     count = len(outer_states)
     bare = is_alike(inner_colors[0, 0], inner_colors[0, 1], inner_colors[0, 2], color)
-    own = bare or _is_painted(inner_colors[0], paint) or (shadowed and _is_shaded(inner_colors[0], color))
+    own = bare or _is_painted(inner_colors[0], paint) or (shadowed and is_shaded(inner_colors[0], color))
     like = 0
     for d in range(len(outer_colors)):
         if inside[d] and _is_painted(outer_colors[d], paint):

@@ -41,14 +41,18 @@ def page(free_port):
 
 
 def enter(handle, value, client: int) -> None:
-    """An input of a browser."""
-    handle._impl.value = value
+    """An input of a browser, in the server's event loop: its echoes of values that are put back run there, too."""
     event = SimpleNamespace(
         client=SimpleNamespace(client_id=client, add_notification=lambda *_, **__: None), client_id=client
     )
-    for callback in handle._impl.update_cb:
-        assert inspect.iscoroutinefunction(callback)  # viser runs others in a pool of threads, after other messages
-        asyncio.run(callback(event))
+
+    async def message() -> None:
+        handle._impl.value = value
+        for callback in handle._impl.update_cb:
+            assert inspect.iscoroutinefunction(callback)  # viser runs others in a pool of threads, after other messages
+            await callback(event)
+
+    asyncio.run_coroutine_threadsafe(message(), handle._impl.gui_api._event_loop).result()
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from tests.support.truth.frame import TruthFrame, render_frame
 from tests.support.truth.picture import plain_picture
 from tests.support.truth.scenes import Variation, sample_scene
 
-#: One effect each, at least as strong as in the world `field`.
+#: One effect each, stronger than in most scenes outside.
 OUTSIDE = {
     "glare": OutdoorErrors(glare=1.2, overexposure=0.4),
     "beam shadow": OutdoorErrors(beams=2, beam_shade=0.7),
