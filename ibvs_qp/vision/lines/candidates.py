@@ -35,8 +35,9 @@ _SHOWS, _DEPTH_STEP = 0.6, 0.5
 _ENDS = 0.5
 #: Another border is nested in it if it lies farther inwards by less than this, the farthest place at which depth is
 #: read to see the surface's end [px at 640], along it (cosine), and the other has this fraction of its score and of its
-#: length at least; it keeps this part of score and confidence.
-_SOON_PX, _ALONG, _RIVAL, _LONG_ENOUGH, _NESTED = 26.0, 0.995, 0.7, 0.33, 0.6
+#: length at least; it keeps this part of score and confidence. A joint of a wall beside the end has up to 0.57 of its
+#: length (truth frames, seeds 0 to 24).
+_SOON_PX, _ALONG, _RIVAL, _LONG_ENOUGH, _NESTED = 26.0, 0.995, 0.7, 0.6, 0.6
 #: Length that earns the full score of an edge of paint, fraction of the picture's width.
 _FULL_LENGTH = 0.4
 #: Logistic regression on candidates of truth frames (families hard, smeared depth, oblique, printed, flush wall; seeds
@@ -99,7 +100,7 @@ class LineSearch:
             fits += self._fits.fit_segments(picture, segments[order], beyond, contents=True, half_width_px=_PAINT_PX)
         shortest = config.min_length * picture.mask.shape[1]
         found = self.classify_lines([fit for fit in fits if fit is not None], picture, surface, shortest)
-        return _outermost(_each_edge_once(found, picture.scale), picture.scale / picture.intrinsics[0])
+        return _each_edge_once(found, picture.scale)
 
     def classify_lines(
         self, fits: list[RefinedLine], picture: Picture, surface: SurfaceRegion, shortest_px: float = 0.0
@@ -149,19 +150,19 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
     return sorted(kept, key=lambda entry: -entry.score)
 
 
-def _outermost(lines: list[Candidate], pixel: float) -> list[Candidate]:
-    """The lines, best first; a border beside one farther out, where the surface certainly ends, is no sure one.
+def demote_nested(lines: list[Candidate], picture: Picture) -> list[Candidate]:
+    """The lines in their order; a border beside one farther out, where the surface certainly ends, is no sure one.
 
-    Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well. A
-    pixel of a picture 640 wide is given normalised.
+    Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well.
     """
+    pixel = picture.scale / picture.intrinsics[0]  # of a picture 640 wide, normalised
     kept, low, high = [], pixel * _SAME_PX, pixel * _SOON_PX
     for line in lines:
         rivals = [other for other in lines if other.ends_surface and other.score >= _RIVAL * line.score]
         if line.borders_plane and any(_beyond(line, other, low, high) for other in rivals):
             line = replace(line, score=_NESTED * line.score, confidence=_NESTED * line.confidence)
         kept.append(line)
-    return sorted(kept, key=lambda entry: -entry.score)
+    return kept
 
 
 def _beyond(line: Candidate, other: Candidate, low: float, high: float) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
-from ibvs_qp.vision.lines.candidates import Candidate, LineSearch, role_of
+from ibvs_qp.vision.lines.candidates import Candidate, LineSearch, demote_nested, role_of
 from ibvs_qp.vision.lines.refine import LineFits, RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
 from ibvs_qp.vision.surface.plane import SurfaceRegion
@@ -212,10 +212,11 @@ class LineTracker:
         """
         seen = [track for track in self.tracks if track.seen and track.kind == "board"]
         scored = self._search.classify_lines([track.line for track in seen], picture, surface)
-        for track, found in zip(seen, scored, strict=True):
-            track.blend(found)
         known = tuple(track.line for track in self.tracks if calm and track.settled)
-        candidates = self._search.find_candidates(picture, surface, known)
+        found = demote_nested(scored + self._search.find_candidates(picture, surface, known), picture)
+        for track, line in zip(seen, found, strict=False):
+            track.blend(line)
+        candidates = sorted(found[len(seen) :], key=lambda entry: -entry.score)
         for candidate in candidates:
             if candidate.kind and candidate.score >= self._config.detect.min_score:
                 self._offer(candidate, picture)
