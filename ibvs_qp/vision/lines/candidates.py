@@ -145,7 +145,7 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
         same = next((k for k, other in enumerate(kept) if on_same_edge(line, other.line.ends_px, scale)), None)
         if same is None:
             kept.append(line)
-        elif line.kind == kept[same].kind and _adds(line, kept[same]):
+        elif line.kind == kept[same].kind and goes_on(line, kept[same].score, kept[same].line.length_px):
             kept[same] = line
     return sorted(kept, key=lambda entry: -entry.score)
 
@@ -179,13 +179,10 @@ def _inwards(line: Candidate, other: Candidate) -> float:
     return other.surface_side * (x * math.cos(other.line.theta) + y * math.sin(other.line.theta) - other.line.rho)
 
 
-def _adds(longer: Candidate, line: Candidate) -> bool:
-    """Whether a longer line on an edge is such an edge in its further part, too: scores are means along lines."""
-    more = longer.line.length_px - line.line.length_px
-    if more <= 0.0:
-        return False
-    further = (longer.score * longer.line.length_px - line.score * line.line.length_px) / more
-    return further >= _FURTHER_SHARE * line.score
+def goes_on(longer: Candidate, score: float, length_px: float) -> bool:
+    """Whether a line on an edge is longer than another, and such an edge in its further part: scores are means."""
+    more = longer.line.length_px - length_px
+    return more > 0.0 and longer.score * longer.line.length_px - score * length_px >= _FURTHER_SHARE * score * more
 
 
 def role_of(theta: float, tilt: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from ibvs_qp.vision.appearance.colors import SurfaceColors
 from ibvs_qp.vision.config import VisionConfig
 from ibvs_qp.vision.flow.motion import CameraMotion
-from ibvs_qp.vision.lines.candidates import Candidate, LineSearch, demote_nested, role_of
+from ibvs_qp.vision.lines.candidates import Candidate, LineSearch, demote_nested, goes_on, role_of
 from ibvs_qp.vision.lines.refine import LineFits, RefinedLine
 from ibvs_qp.vision.picture.picture import Picture
 from ibvs_qp.vision.surface.plane import SurfaceRegion
@@ -231,7 +231,9 @@ class LineTracker:
         if same is None:
             self._start(candidate)
         elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
-            same.adopt(candidate.line)
+            # a longer fit that leans off the edge fits its sides worse; the score of an edge of paint is its length
+            if same.kind == "paint" or goes_on(candidate, same.score, same.line.length_px):
+                same.adopt(candidate.line)
 
     def _start(self, candidate: Candidate, hint: str = "") -> None:
         if len(self.tracks) < self._config.track.capacity:
