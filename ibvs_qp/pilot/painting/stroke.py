@@ -27,8 +27,10 @@ MOST_UNLED_M = 0.4
 UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 #: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
 ASIDE_M = 0.002
-#: Most of the time of painting without contact [-], below this push [N].
-MOST_LOST, LOST_N = 0.02, 0.3
+#: Most of the time of painting without contact [-], below this push [N]. A place has felt the brush above this part of
+#: the commanded push: the filtered push of a tip that leaves the wall takes 0.2 s to the lower limit, 2 cm of way, and a
+#: touch exceeds it at once.
+MOST_LOST, LOST_N, FELT = 0.02, 0.3, 0.3
 #: Length of the pieces of a stroke that have felt the brush or not [m]: more than one tick's way at 0.5 m/s.
 PIECE_M = 0.0025
 #: Last part of a stroke, whose overlap does not count [m].
@@ -189,7 +191,7 @@ class Stroke:
             self.behind = max(self.behind, -self.travel * self.along.moved)
         if inputs.push <= LOST_N:
             self.lost_s += dt
-        elif inputs.in_contact:  # a sample of the force sensor alone may be noise
+        elif inputs.in_contact and inputs.push > FELT * inputs.push_reference:  # one sample alone may be noise
             self._felt[self._piece(self.along.u)] = True
 
     def _hole(self) -> tuple[float, float] | None:

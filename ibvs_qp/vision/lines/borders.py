@@ -125,7 +125,7 @@ def score_borders(
 
 def end_of_paint(picture: Picture, surface: SurfaceRegion, colors: SurfaceColors) -> np.ndarray:
     """Samples near both paint and board, bool (rows, columns)."""
-    labels = colors.label(picture.colors, *picture.grid.pixels)
+    labels = colors.label(picture.colors, *picture.grid.pixels, shade=True)
     marks = surface.cells, labels == BOARD, labels == PAINT
     near = [cv2.dilate(cells.view(np.uint8), _NEAR_CELLS) > 0 for cells in marks]
     return near[0] & near[1] & near[2]
@@ -135,7 +135,7 @@ def board_beside_paint(fit: RefinedLine, colors: SurfaceColors, least: float) ->
     """Side of the board, +1 or -1, if the other one shows paint along the least fraction of the line; else 0."""
     if not colors.paint_distinct or fit.sides.size == 0:
         return 0
-    labels = colors.label(fit.sides, *fit.pixels.T)
+    labels = colors.label(fit.sides, *fit.pixels.T, shade=True)
     board, paint = ((labels == kind).mean(axis=1) >= least for kind in (BOARD, PAINT))
     return 1 if board[1] and paint[0] else -1 if board[0] and paint[1] else 0
 
@@ -146,7 +146,7 @@ def differing(segments: np.ndarray, picture: Picture, colors: SurfaceColors) -> 
     u, v = places_beside(segments, ways_aside(segments, _LOOK_PX * picture.scale), _LOOKS)
     u = np.minimum(np.maximum(np.rint(u), 0.0), width - 1.0).astype(np.intp)
     v = np.minimum(np.maximum(np.rint(v), 0.0), height - 1.0).astype(np.intp)
-    labels = colors.label(picture.rgb[v, u], u, v)
+    labels = colors.label(picture.rgb[v, u], u, v, shade=True)
     one, two = labels[:, 0], labels[:, 1]
     return ((one != two) & (one > 0) & (two > 0)).mean(axis=1)
 

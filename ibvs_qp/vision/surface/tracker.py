@@ -99,6 +99,7 @@ class SurfaceTracker:
         if isinstance(found, str):
             return found
         self.plane, self.region = found.plane, found
+        self._colors.shadowed = found.shadowed
         return None
 
     def region_now(self, picture: Picture) -> SurfaceRegion:
@@ -112,6 +113,7 @@ class SurfaceTracker:
             plane = self._refit(plane, picture) or plane
         if self.region.plane is not plane:
             self.region = self._follow(picture, plane, self.region)
+            self._colors.shadowed = self.region.shadowed
         return self.region
 
     def _followed(self, picture: Picture, predicted: np.ndarray) -> PlaneEstimate | None:
