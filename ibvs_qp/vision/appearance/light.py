@@ -53,6 +53,9 @@ _BEYOND = 0.06
 #: [grey levels].
 SHADED, DARKEST = 0.92, 0.12
 _TINT, _TINT_NOISE = 0.055, 3.0
+#: The sun that a surface mirrors adds white light to its own: at most this [grey levels], to this part of its colour at
+#: least and at most. A grey surface only gets brighter: white light shows at colours with this sine from grey.
+_MOST_GLARE, _GLARED_LEAST, _GLARED_MOST, _COLORED = 400.0, 0.4, 1.4, 0.15
 
 
 @inner
@@ -67,11 +70,45 @@ def in_other_light(ones, twos, dot):
 
 @inner
 def is_shaded(one, color):
-    """Whether a colour (3,) is another (3,) in sun or in shadow."""
+    """Whether a colour (3,) is another (3,) in sun, in shadow, or in glare."""
     dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
     ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
     twos = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
-    return in_other_light(ones, twos, dot)
+    return in_other_light(ones, twos, dot) or _is_glared(one, color, ones, twos)
+
+
+@inner
+def _is_glared(one, color, ones, twos):
+    """Whether a colour is a part of another one with white light: one = part color + white, cut off at the top.
+
+    The squares of their lengths are given.
+    """
+    grey = color[0] + color[1] + color[2]
+    if twos - grey * grey / 3.0 < _COLORED * _COLORED * twos:
+        return False
+    # least squares over the channels that are not cut off
+    count, total, mixed, square, product = 0.0, 0.0, 0.0, 0.0, 0.0
+    for c in range(3):
+        if one[c] < _CUT:
+            count += 1.0
+            total += color[c]
+            mixed += one[c]
+            square += color[c] * color[c]
+            product += color[c] * one[c]
+    spread = square * count - total * total
+    if count < 1.5 or spread < 1.0:
+        return False
+    part = (product * count - mixed * total) / spread
+    white = (mixed - part * total) / count
+    if not (_GLARED_LEAST < part < _GLARED_MOST and 0.0 < white < _MOST_GLARE):
+        return False
+    off = 0.0
+    for c in range(3):
+        left = one[c] - part * color[c] - white
+        if one[c] < _CUT or left > 0.0:
+            off += left * left
+    gate = _TINT * math.sqrt(ones) + _TINT_NOISE
+    return off < gate * gate
 
 
 @kernel("b1[::1](f8[:, ::1], f8[::1])")

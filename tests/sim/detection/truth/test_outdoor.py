@@ -87,6 +87,19 @@ def test_a_shadow_scales_all_channels_alike(light: float, tint: float, shade: bo
     assert bool(shaded_colors(dark, board)) == shade and bool(shaded_colors(board, dark)) == shade
 
 
+@pytest.mark.parametrize(("light", "white"), [(1.0, 60.0), (0.7, 150.0), (1.0, 100.0)])  # green is cut off in the last
+def test_glare_adds_white_light_to_a_colour(light: float, white: float) -> None:
+    lime = np.array([126.0, 195.0, 39.0])
+    assert shaded_colors(np.minimum(light * lime + white, 255.0), lime)
+
+
+def test_another_colour_is_no_glare() -> None:
+    lime = np.array([126.0, 195.0, 39.0])
+    others = np.array([[80, 130, 200], [210, 230, 255], [190, 50, 50], [150, 112, 92], [211, 145, 155], [205, 200, 190]])
+    assert not shaded_colors(others, lime).any()
+    assert not shaded_colors(np.array([[255, 255, 255], [255, 255, 20]]), lime).any()  # cut off: nothing is known
+
+
 def test_paint_and_brick_are_no_shadow() -> None:
     board = np.array([228.0, 226.0, 220.0])
     assert not shaded_colors(np.array([[40, 90, 200], [150, 112, 92], [190, 50, 50], [12, 12, 12]]), board).any()
