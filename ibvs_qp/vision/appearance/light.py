@@ -59,30 +59,41 @@ _MOST_GLARE, _GLARED_LEAST, _GLARED_MOST, _COLORED = 400.0, 0.4, 1.4, 0.15
 
 
 @inner
-def in_other_light(ones, twos, dot):
-    """Whether two colours are one in sun and in shadow, by the squares of their lengths and their product."""
-    darker, brighter = min(ones, twos), max(ones, twos)
+def in_other_light(one, two):
+    """Whether two colours (3,) are one in sun and in shadow."""
+    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
+    twos = two[0] * two[0] + two[1] * two[1] + two[2] * two[2]
+    return _in_light(one, two, ones, twos) if ones < twos else _in_light(two, one, twos, ones)
+
+
+@inner
+def _in_light(dark, bright, darker, brighter):
+    """Whether a colour is the shadow of another, brighter one, by the squares of their lengths, too."""
     if darker < DARKEST * DARKEST * brighter or darker > SHADED * SHADED * brighter or darker <= 0.0:
         return False
+    dot = dark[0] * bright[0] + dark[1] * bright[1] + dark[2] * bright[2]
+    for c in range(3):
+        one, two = (c + 1) % 3, (c + 2) % 3
+        if bright[c] >= _CUT and bright[one] < _CUT and bright[two] < _CUT:  # it is at least as bright as it looks
+            whole = dark[c] * (bright[one] + bright[two]) / max(dark[one] + dark[two], 1.0)
+            if whole > bright[c]:
+                dot += dark[c] * (whole - bright[c])
+                brighter += whole * whole - bright[c] * bright[c]
     gate = _TINT + _TINT_NOISE / math.sqrt(darker)
-    return 1.0 - dot * dot / (ones * twos) < gate * gate
+    return 1.0 - dot * dot / (darker * brighter) < gate * gate
 
 
 @inner
 def is_shaded(one, color):
     """Whether a colour (3,) is another (3,) in sun, in shadow, or in glare."""
-    dot = one[0] * color[0] + one[1] * color[1] + one[2] * color[2]
-    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
-    twos = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
-    return in_other_light(ones, twos, dot) or _is_glared(one, color, ones, twos)
+    return in_other_light(one, color) or _is_glared(one, color)
 
 
 @inner
-def _is_glared(one, color, ones, twos):
-    """Whether a colour is a part of another one with white light: one = part color + white, cut off at the top.
-
-    The squares of their lengths are given.
-    """
+def _is_glared(one, color):
+    """Whether a colour is a part of another one with white light: one = part color + white, cut off at the top."""
+    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
+    twos = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
     grey = color[0] + color[1] + color[2]
     if twos - grey * grey / 3.0 < _COLORED * _COLORED * twos:
         return False

@@ -221,7 +221,7 @@ def _border_evidence(
     fraction by colour, and fraction to which the surface reaches, (n, 2, 4).
     """
     states, evidence = np.empty((2, len(depth_px)), np.int64), np.zeros((len(pixels), 2, 4))
-    colors, inside = np.empty((2, 3, 3)), np.empty((2, 3), np.bool_)
+    colors, middle, inside = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3), np.bool_)
     sums, off = np.empty((2, 8)), np.empty((2, 2, 3))
     for i in range(len(pixels)):
         sums[:] = 0.0
@@ -240,7 +240,7 @@ def _border_evidence(
             if not free:
                 continue
             count += 1
-            shaded = _light_changes(colors[0], colors[1])
+            shaded = _light_changes(colors[0], colors[1], middle)
             for side in range(2):
                 far = 1 - side
                 _ends_here(
@@ -303,13 +303,14 @@ def _level(off):
 
 
 @inner
-def _light_changes(one, two):
-    """Whether the colours next to a place, (3, 3) by distance on each side, are one colour in sun and in shadow."""
-    dot = ones = twos = 0.0
+def _light_changes(one, two, middle):
+    """Whether the colours next to a place, (3, 3) by distance on each side, are one colour in sun and in shadow.
+
+    Their means (2, 3) are filled in.
+    """
     for c in range(3):
-        a, b = 0.5 * (one[0, c] + one[1, c]), 0.5 * (two[0, c] + two[1, c])
-        dot, ones, twos = dot + a * b, ones + a * a, twos + b * b
-    return in_other_light(ones, twos, dot)
+        middle[0, c], middle[1, c] = 0.5 * (one[0, c] + one[1, c]), 0.5 * (two[0, c] + two[1, c])
+    return in_other_light(middle[0], middle[1])
 
 
 @inner
