@@ -64,6 +64,7 @@ class Stroke:
     place: float  # v where it belongs [m]
     painted_s: float = 0.0  # time of painting in the job so far [s]
     lost_s: float = 0.0  # and of it without contact [s]
+    slipped: bool = False  # whether an edge has shown an error of the odometer in a stroke before
     touches: int = 0  # that were taken back before it
     retouches: int = 0
     back_to: float = math.nan  # u to which the tip goes back for a retouch [m], NaN otherwise
@@ -77,8 +78,13 @@ class Stroke:
 
     def following(self) -> Stroke:
         """The stroke after this one, whose place is kept until the step to the next one begins."""
-        number = self.number + 1
-        return Stroke(self.config, self.cross, self.along, number, self.place, self.painted_s, self.lost_s)
+        number, slipped = self.number + 1, self.slipped or self._slips
+        return Stroke(self.config, self.cross, self.along, number, self.place, self.painted_s, self.lost_s, slipped)
+
+    @property
+    def _slips(self) -> bool:
+        """Whether an edge has shown an error of the odometer beyond the tolerance of the length."""
+        return self.along.slip > LENGTH_TOLERANCE_M
 
     @property
     def goes_back(self) -> bool:
@@ -249,7 +255,8 @@ class Stroke:
         # The greatest of many estimates errs towards more: no margin.
         if (painted := self.longest + self.behind) - asked > LENGTH_TOLERANCE_M:
             return f"row {row} is painted over {painted * 1e3:.0f} mm, {asked * 1e3:.0f} mm were asked"
-        if along.slip > config.gates.stop_m:
+        # an odometer that errs in two strokes is right: one of the edges is none
+        if along.slip > config.gates.stop_m or (self._slips and self.slipped):
             return f"row {row} met an edge {along.slip * 1e3:.0f} mm from where the odometer expected it"
         if hole := self._hole():
             return self._without_contact(hole)

@@ -56,6 +56,16 @@ def slipped() -> PaintedWall:
     return world
 
 
+def slipping(strokes: int) -> PaintedWall:
+    """The odometer slips by 30 mm in stroke 2, and in stroke 3."""
+    world = flown("paint", 2, 3.0, rows=3, stroke_m=1.0)
+    for stroke in range(strokes):
+        world.fly(60.0, until="paint", stroke=2 + stroke)
+        world.fly(3.0)
+        world.odometer += world.to_wall(-0.03, 0.0)
+    return world
+
+
 def swung(swing: float, length: float = 0.2, stroke: int = 2) -> PaintedWall:
     """A stroke swings, and nothing moves the tip back to its place."""
     world = wall(rows=2, stroke_m=1.5, stuck_across=stroke == 1)
@@ -101,6 +111,8 @@ JOBS: dict[str, tuple[Job, str]] = {
     "bare at the beginning, which no pass reaches": (lambda: bare(0.02, 1.1), BARE),
     "bare at the end, in the first pass": (lambda: bare(0.02, 0.025), ""),
     "bare after a slip of the odometer, in the first pass": (slipped, ""),
+    "a slip of the odometer in one stroke": (lambda: slipping(1), ""),
+    "a slip in two strokes": (lambda: slipping(2), r"row 3 met an edge \d+ mm from where the odometer expected it"),
     "beside its place": (
         lambda: wall(rows=1, wave=lambda _stroke, _u: 0.012, stuck_across=True),
         r"row 1 lies \+12 mm from its place, known to 0\.\d mm, limit 8 mm",
