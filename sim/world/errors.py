@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ibvs_qp.config.errors import ConfigError
 from ibvs_qp.config.settings import Checked, load_toml, setting
 
@@ -174,10 +176,26 @@ class ReliefErrors(Checked):
     step_m: float = _size("height of an upright step", "m", 0.02)
 
 
+#: Effects of pictures outside that come together.
+_TOGETHER = (
+    ("beams",),
+    ("own_shade",),
+    ("glare",),
+    ("overexposure",),
+    ("low_light",),
+    ("rust_per_m",),
+    ("stains_per_m2",),
+    ("broken_m",),
+    ("wet_gloss", "wet_holes"),
+    ("drops", "dust"),
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutdoorErrors(Checked):
     """Pictures outside, drawn from the seed; shade, glare, exposure, low light and gloss: half their size to all."""
 
+    chance: float = setting(1.0, "chance of every effect in a flight", low=0.0, high=1.0)
     beams: int = setting(0, "shadows of beams across the board", low=0, high=20)
     beam_shade: float = _size("light that the shadow of a beam takes", "", 0.9)
     own_shade: float = _size("light that the vehicle's own shadow takes, propellers less", "", 0.9)
@@ -191,6 +209,11 @@ class OutdoorErrors(Checked):
     wet_holes: float = _size("fraction of wet paint without a depth reading", "", 1.0)
     drops: int = setting(0, "rain drops on the lens", low=0, high=200)
     dust: int = setting(0, "specks of dust on the lens", low=0, high=500)
+
+    def drawn(self, rng: np.random.Generator) -> OutdoorErrors:
+        """The effects of one flight, of which each is present by chance."""
+        absent = {name: 0 for group in _TOGETHER if rng.random() >= self.chance for name in group}
+        return dataclasses.replace(self, chance=1.0, **absent)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,8 +51,9 @@ _SAME_PAINT = 30.0
 _MOST = 2
 #: A shadow's edge has no step of depth: means over a line of readings before this place in the list, and from it on,
 #: differ by less than this fraction; a board 1 cm before a wall, seen from 1 m, has 1 %. Readings farther off are of
-#: another thing; of the near ones this fraction at most may be.
-_FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW = 3, 0.007, 0.05, 0.3
+#: another thing; of the near ones this fraction at most may be. The limit grows by this factor at most with the noise of
+#: few readings.
+_FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW, _NOISIER = 3, 0.007, 0.05, 0.3, 2.0
 #: By so large a fraction of the line the surface ends a little farther out, and the shadow's edge lies before that.
 _ENDS_SOON = 0.3
 #: A border that only colour shows counts this much, and one that depth shows against the colour.
@@ -255,7 +256,8 @@ def _border_evidence(
                     shaded,
                     sums[side],
                 )
-        near, beyond = _level(off[:, 0]), _level(off[:, 1])
+        whole = places * _FAR_FROM
+        near, beyond = _level(off[:, 0], whole), _level(off[:, 1], places * len(depth_px) - whole)
         for side in range(2):
             if count < _LEAST_SHARE * places:
                 continue
@@ -291,15 +293,17 @@ def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states, off):
 
 
 @inner
-def _level(off):
+def _level(off, whole):
     """Whether the surface goes on beyond a line by depth.
 
-    Of the readings on both sides these are the sum, the number, and the number of those far off, (2, 3).
+    Of the readings on both sides these are the sum, the number, and the number of those far off, (2, 3); a whole side
+    has so many. Means of fewer ones, at the border of the picture, are noisier.
     """
     one, two = off[0, 1], off[1, 1]
     if one <= off[0, 2] * (1.0 / _FEW - 1.0) or two <= off[1, 2] * (1.0 / _FEW - 1.0):
         return False
-    return abs(off[0, 0] / one - off[1, 0] / two) < _NO_STEP
+    noise = min(math.sqrt(whole / min(one, two)), _NOISIER)
+    return abs(off[0, 0] / one - off[1, 0] / two) < _NO_STEP * noise
 
 
 @inner

@@ -61,8 +61,8 @@ class PictureFinish:
             self.noise.add_white_depth(scene.errors.depth.noise_relative, stream(seed, "depth noise"))
         self.defects = CameraDefects(scene, vehicle, self.intrinsics, seed)
         self.outdoor = None
-        if scene.errors.outdoor != OutdoorErrors():
-            self.outdoor = Outdoor(scene.errors.outdoor, Ground.of(BoardGeometry(scene)), vehicle, shape, seed)
+        if (outdoor := scene.errors.outdoor.drawn(stream(seed, "outdoor effects"))) != OutdoorErrors():
+            self.outdoor = Outdoor(outdoor, Ground.of(BoardGeometry(scene)), vehicle, shape, seed)
         layer = vehicle_layer(scene, vehicle, self.intrinsics, self.rng)
         seen, grown = self.defects.layer(layer), self.defects.depth.grown
         self.arm_box, self.propeller_box = _bounding_box(seen.mask), _bounding_box(seen.propellers)

@@ -15,6 +15,7 @@ from sim.sensors.cameras import PlaneCamera
 from sim.sensors.cameras.curved import CurvedCamera
 from sim.world.canvas import Canvas
 from sim.world.errors import OutdoorErrors, WorldErrors, world_errors, world_names
+from sim.world.random_streams import stream
 from sim.world.scene import Scene, SurfaceScene
 from tests.support.truth import FAMILIES, TruthScene, render_frame, sample_scene
 from tests.support.truth.accuracy import line_errors
@@ -49,7 +50,18 @@ def test_without_effects_pictures_are_as_before() -> None:
     seen = render_frame(dataclasses.replace(scene, outdoor=OutdoorErrors(beam_shade=0.5)))  # a beam's, and no beam
     assert np.array_equal(render_frame(scene).frame.rgb, seen.frame.rgb)
     assert np.array_equal(render_frame(scene).frame.depth, seen.frame.depth)
-    assert all(world_errors(world).outdoor == OutdoorErrors() for world in world_names())
+    assert [world for world in world_names() if world_errors(world).outdoor != OutdoorErrors()] == ["field"]
+
+
+def test_a_flight_has_some_of_the_effects_by_its_seed() -> None:
+    field = world_errors("field").outdoor
+    drawn = [field.drawn(stream(seed, "outdoor effects")) for seed in range(200)]
+    for name in ("beams", "own_shade", "glare", "rust_per_m", "wet_gloss", "drops"):
+        present = [bool(getattr(each, name)) for each in drawn]
+        assert 0.2 < np.mean(present) < 0.4, name
+    assert all(bool(each.wet_gloss) == bool(each.wet_holes) for each in drawn)
+    assert field.drawn(stream(3, "outdoor effects")) == drawn[3]
+    assert dataclasses.replace(field, chance=0.0).drawn(stream(3, "outdoor effects")).drops == 0
 
 
 def test_wall_and_lens_keep_their_effects_and_the_own_shadow_moves() -> None:
