@@ -28,8 +28,7 @@ UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 #: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
 ASIDE_M = 0.002
 #: Most of the time of painting without contact [-], below this push [N]. A place has felt the brush above this part of
-#: the commanded push: the filtered push of a tip that leaves the wall takes 0.2 s to the lower limit, 2 cm of way, and a
-#: touch exceeds it at once.
+#: the commanded push: the filtered push of a tip that leaves the wall takes 0.2 s to the lower limit, 2 cm of way.
 MOST_LOST, LOST_N, FELT = 0.02, 0.3, 0.3
 #: Length of the pieces of a stroke that have felt the brush or not [m]: more than one tick's way at 0.5 m/s.
 PIECE_M = 0.0025

@@ -51,8 +51,8 @@ _SAME_PAINT = 30.0
 _MOST = 2
 #: A shadow's edge has no step of depth: means over a line of readings before this place in the list, and from it on,
 #: differ by less than this fraction; a board 1 cm before a wall, seen from 1 m, has 1 %. Readings farther off are of
-#: another thing; of the near ones this fraction at most may be. The limit grows by this factor at most with the noise of
-#: few readings.
+#: another thing; of the near ones this fraction at most may be. The limit grows with the noise of few readings, by this
+#: factor at most.
 _FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW, _NOISIER = 3, 0.007, 0.05, 0.3, 2.0
 #: By so large a fraction of the line the surface ends a little farther out, and the shadow's edge lies before that.
 _ENDS_SOON = 0.3

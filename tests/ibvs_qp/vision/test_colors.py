@@ -99,3 +99,17 @@ def test_light_of_a_sample_is_its_share_of_the_board() -> None:
     assert tinted.tolist() == [True, True, False, True, False, True]
     assert even.tolist() == [True, False, False, False, False, True]
     assert not light_of(samples, board, board, GATE)[2][0]
+
+
+def test_colours_in_the_shadow_that_lies_on_the_surface_keep_their_labels() -> None:
+    colors = SurfaceColors((228, 226, 220), (40, 90, 200), 42.0)
+    seen = np.array([[228, 226, 220], [110, 110, 112], [40, 90, 200], [20, 45, 102], [150, 112, 92]], np.uint8)
+    lit, both = [BOARD, OTHER, PAINT, OTHER, OTHER], [BOARD, BOARD, PAINT, PAINT, OTHER]
+    assert colors.label(seen, shade=True).tolist() == lit
+    colors.shadowed = True
+    assert colors.label(seen, shade=True).tolist() == both
+    assert colors.label(seen).tolist() == lit
+    grey = SurfaceColors((228, 226, 220), (110, 110, 112), 42.0)  # paint of a shadow's tint
+    grey.shadowed = True
+    assert grey.label(seen[[0, 1]], shade=True).tolist() == [BOARD, PAINT]
+    assert grey.label(np.array([[60, 60, 61]], np.uint8), shade=True).tolist() == [BOARD]

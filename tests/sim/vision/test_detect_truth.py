@@ -49,6 +49,12 @@ def test_what_depth_cannot_tell_is_never_wrong_and_sure(family: str) -> None:
     assert errors.offset_px, "colour shows some of the edges"
 
 
+# a joint of the wall runs 4 px beside the top edge, half as long
+def test_a_joint_beside_the_edge_makes_it_no_nested_border() -> None:
+    errors = run("printed", 1, 10)
+    assert errors.found == 1.0 and not errors.wrong
+
+
 def test_roll_through_every_seam_without_an_error_jump() -> None:
     base, worst = TruthScene(size_m=(0.5, 0.42)), 0.0
     for degrees in range(-180, 181, 40):

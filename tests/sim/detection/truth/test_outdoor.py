@@ -107,7 +107,9 @@ def test_glare_adds_white_light_to_a_colour(light: float, white: float) -> None:
 
 def test_another_colour_is_no_glare() -> None:
     lime = np.array([126.0, 195.0, 39.0])
-    others = np.array([[80, 130, 200], [210, 230, 255], [190, 50, 50], [150, 112, 92], [211, 145, 155], [205, 200, 190]])
+    others = np.array(
+        [[80, 130, 200], [210, 230, 255], [190, 50, 50], [150, 112, 92], [211, 145, 155], [205, 200, 190]]
+    )
     assert not shaded_colors(others, lime).any()
     assert not shaded_colors(np.array([[255, 255, 255], [255, 255, 20]]), lime).any()  # cut off: nothing is known
 
@@ -144,9 +146,20 @@ def test_a_shadow_across_the_board_hides_none_of_its_edges(seed: int) -> None:
     assert figures.errors.found == 1.0 and not figures.errors.wrong, figures.errors.missed
 
 
-# paint runs along the edge 9 px inside it, where depth ends soon as well
+@pytest.mark.parametrize("seed", [4, 9])
+def test_a_line_is_followed_across_a_shadow(seed: int) -> None:
+    ((_, truth),), method = frames(["beam shadow"], seed), OwnMethod()
+    seen = [
+        method.follow(dataclasses.replace(truth.frame, stamp_ns=k * 33_000_000), truth.seed).guides["right"]
+        for k in range(4)
+    ]
+    first, *later = [0.0 if line is None else float(np.hypot(*(line.pixels[1] - line.pixels[0]))) for line in seen]
+    assert min(later) > 0.95 * first > 100.0
+
+
+# paint runs along the edge 9 px inside it, where depth ends soon as well; in 207 a longer line leans off the edge
 def test_a_run_of_paint_beside_the_edge_is_not_taken_for_it() -> None:
-    figures = measure(["stains"], [15, 18])["stains"]
+    figures = measure(["stains"], [15, 18, 207])["stains"]
     assert not figures.sure_wrong and figures.errors.found == 1.0
 
 
