@@ -178,7 +178,7 @@ class ReliefErrors(Checked):
 
 #: Effects of pictures outside that come together.
 _TOGETHER = (
-    ("beams",),
+    ("beams", "beam_shade"),
     ("own_shade",),
     ("glare",),
     ("overexposure",),
@@ -195,7 +195,7 @@ _TOGETHER = (
 class OutdoorErrors(Checked):
     """Pictures outside, drawn from the seed; shade, glare, exposure, low light and gloss: half their size to all."""
 
-    chance: float = setting(1.0, "chance of every effect in a flight", low=0.0, high=1.0)
+    chance: float = setting(1.0, "probability that a flight has an effect, each by itself", low=0.0, high=1.0)
     beams: int = setting(0, "shadows of beams across the board", low=0, high=20)
     beam_shade: float = _size("light that the shadow of a beam takes", "", 0.9)
     own_shade: float = _size("light that the vehicle's own shadow takes, propellers less", "", 0.9)

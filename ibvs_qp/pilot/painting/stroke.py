@@ -27,9 +27,10 @@ MOST_UNLED_M = 0.4
 UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 #: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
 ASIDE_M = 0.002
-#: Most of the time of painting without contact [-], below this push [N]. A place has felt the brush above this part of
-#: the commanded push: the filtered push of a tip that leaves the wall takes 0.2 s to the lower limit, 2 cm of way.
-MOST_LOST, LOST_N, FELT = 0.02, 0.3, 0.3
+#: Most of the time of painting without contact [-]; push of no contact [N]; a place has felt the brush above
+#: this part of the commanded push [-]: the filtered push falls late, and a hole looks shorter by 10 mm at 0.3, by 5 mm
+#: at 0.5.
+MOST_LOST, LOST_N, FELT_SHARE = 0.02, 0.3, 0.5
 #: Length of the pieces of a stroke that have felt the brush or not [m]: more than one tick's way at 0.5 m/s.
 PIECE_M = 0.0025
 #: Last part of a stroke, whose overlap does not count [m].
@@ -196,7 +197,7 @@ class Stroke:
             self.behind = max(self.behind, -self.travel * self.along.moved)
         if inputs.push <= LOST_N:
             self.lost_s += dt
-        elif inputs.in_contact and inputs.push > FELT * inputs.push_reference:  # one sample alone may be noise
+        elif inputs.in_contact and inputs.push > FELT_SHARE * inputs.push_reference:  # one sample alone may be noise
             self._felt[self._piece(self.along.u)] = True
 
     def _hole(self) -> tuple[float, float] | None:
@@ -254,7 +255,7 @@ class Stroke:
         # The greatest of many estimates errs towards more: no margin.
         if (painted := self.longest + self.behind) - asked > LENGTH_TOLERANCE_M:
             return f"row {row} is painted over {painted * 1e3:.0f} mm, {asked * 1e3:.0f} mm were asked"
-        # an odometer that errs in two strokes is right: one of the edges is none
+        # the odometer seldom errs in two strokes: one of the edges is false
         if along.slip > config.gates.stop_m or (self._slips and self.slipped):
             return f"row {row} met an edge {along.slip * 1e3:.0f} mm from where the odometer expected it"
         if hole := self._hole():

@@ -14,6 +14,8 @@ from ibvs_qp.vision.appearance.light import (
     UNKNOWN,
     LightField,
     fit_light,
+    has_hue,
+    in_other_light,
     is_shaded,
     squared_distance,
 )
@@ -21,8 +23,8 @@ from ibvs_qp.vision.compilation import inner, kernel, middle
 from ibvs_qp.vision.picture.layout import CoarseGrid
 from ibvs_qp.vision.picture.picture import Picture
 
-#: Labels of a colour.
-OTHER, BOARD, PAINT = 0, 1, 2
+#: Labels of a colour, and the bit of a label that holds in shadow or glare only.
+OTHER, BOARD, PAINT, SHADE = 0, 1, 2, 4
 #: Entries of one table, as a power of two, and steps of a channel.
 _TABLE_BITS, _SIDE = 15, 32
 #: Drift of the board that renews the tables, and the brightest that a channel can be [grey levels].
@@ -90,12 +92,9 @@ def like_colors(colors, board, paint, gate):
     return labels
 
 
-@kernel("u1[::1](f4[::1], f4[::1], f8, b1)")
-def _label_table(board, paint, gate, shade):
-    """One table: colours within the gate of the paint [grey levels] and not nearer to the board are paint.
-
-    With shade, other colours are those of the board, else of the paint, in sun or in shadow.
-    """
+@kernel("u1[::1](f4[::1], f4[::1], f8)")
+def _label_table(board, paint, gate):
+    """One table: colours within the gate of the paint [grey levels] and not nearer to the board are paint."""
     table, gate_squared = np.empty((_SIDE, _SIDE, _SIDE), np.uint8), np.float32(gate * gate)
     center = np.arange(_SIDE).astype(np.float32) * np.float32(8.0) + np.float32(4.0)
     for red in range(_SIDE):
@@ -106,18 +105,25 @@ def _label_table(board, paint, gate, shade):
                 to_paint = _squared_distance(center[red], center[green], center[blue], paint)
                 painted = (to_paint < gate_squared) & (to_paint < to_board)  # no branches: vectorised
                 row[blue] = PAINT if painted else BOARD if to_board < gate_squared else OTHER
-    if shade:
-        known, one = paint[0] < np.inf and not is_shaded(paint, board), np.empty(3)
-        for red in range(_SIDE):
-            for green in range(_SIDE):
-                for blue in range(_SIDE):
-                    if table[red, green, blue] != OTHER:
-                        continue
-                    one[0], one[1], one[2] = center[red], center[green], center[blue]
-                    if is_shaded(one, board):
-                        table[red, green, blue] = BOARD
-                    elif known and is_shaded(one, paint):
-                        table[red, green, blue] = PAINT
+    return table.reshape(-1)
+
+
+@kernel("u1[::1](f4[::1], f4[::1])")
+def _shade_table(board, paint):
+    """Labels of all colours in shadow and glare: the board's, else the paint's in shadow if it has a hue of its own.
+
+    White light on paint looks like a thin coat of it on a white board, and grey paint like any wall.
+    """
+    table, one = np.zeros((_SIDE, _SIDE, _SIDE), np.uint8), np.empty(3)
+    own = paint[0] < np.inf and has_hue(paint) and not is_shaded(paint, board)
+    for red in range(_SIDE):
+        for green in range(_SIDE):
+            for blue in range(_SIDE):
+                one[0], one[1], one[2] = 8.0 * red + 4.0, 8.0 * green + 4.0, 8.0 * blue + 4.0
+                if is_shaded(one, board):
+                    table[red, green, blue] = BOARD | SHADE
+                elif own and in_other_light(one, paint):
+                    table[red, green, blue] = PAINT | SHADE
     return table.reshape(-1)
 
 
@@ -169,7 +175,7 @@ class SurfaceColors:
         board: Colour of the board in the light of the reference, float32 (3,), or None.
         paint: The same of the paint.
         light: How light falls on the surface, None where it is even.
-        shadowed: Whether shadows lie on the surface.
+        shadowed: Whether shadows or glare lie on the surface.
     """
 
     def __init__(self, board: tuple[int, int, int] | None, paint: tuple[int, int, int] | None, gate: float) -> None:
@@ -184,7 +190,8 @@ class SurfaceColors:
         self.paint = self._named
         self.light: LightField | None = None
         self.shadowed = False
-        self._tables: dict[tuple[int, bool], np.ndarray] = {}  # by the step of light and shade, of these colours
+        self._tables: dict[int, np.ndarray] = {}  # by the step of light, of these colours
+        self._shade: np.ndarray | None = None  # labels of these colours in shade
         self._tabled: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
         self._joined: dict[bool, tuple[tuple[int, ...], np.ndarray]] = {}  # steps and their tables, by shade
 
@@ -258,8 +265,8 @@ class SurfaceColors:
     ) -> np.ndarray:
         """OTHER, BOARD or PAINT for colours uint8 (..., 3), all OTHER for an unknown board.
 
-        They are in the light at pixels, columns u and rows v [px], (...), or in that of the reference, and, where shade
-        is asked for, in the shadows that lie on the surface.
+        They are in the light at pixels, columns u and rows v [px], (...), or in that of the reference, and, with shade,
+        in the shadows and the glare that lie on the surface.
         """
         shape, levels = colors.shape[:-1], _NO_LEVELS
         if self.board is None:
@@ -271,36 +278,42 @@ class SurfaceColors:
                 for at, size in zip((v, u), self.light.shape, strict=True)
             )
             levels = np.broadcast_to(cells[row, column], shape).flatten()
-        table = self.table(shade=shade)
-        return labels_of(np.ascontiguousarray(colors).reshape(-1, 3), levels, table).reshape(shape)
+        labels = labels_of(np.ascontiguousarray(colors).reshape(-1, 3), levels, self.table(shade=shade))
+        return (labels & ~np.uint8(SHADE)).reshape(shape)
 
     def table(self, *, shade: bool = False) -> np.ndarray:
         """Labels of all colours, one table after the other for every level of light, uint8 (levels * 32768,).
 
-        Red comes first; the board must be known. Tables are kept while the colours hold. With shade they hold in the
-        shadows that lie on the surface, too.
+        Red comes first; the board must be known. Tables are kept while the colours hold. With shade, other colours have
+        the labels, with the bit `SHADE`, that they have in the shadows and the glare that lie on the surface.
         """
         assert self.board is not None
         paint, steps = self.paint if self.paint_distinct else None, _EVEN if self.light is None else self.light.steps
         shade = shade and self.shadowed
         if _differ(paint, self._tabled[1]) or _differ(self.board, self._tabled[0]):
-            self._tabled = (self.board.copy(), paint)
+            self._tabled, self._shade = (self.board.copy(), paint), None
             self._joined.clear()
             self._tables.clear()
         if shade not in self._joined or self._joined[shade][0] != steps:
             for step in steps:
-                if (step, shade) not in self._tables:
-                    self._tables[step, shade] = self._table_in(math.exp(LIGHT_STEP * step), shade)
-            self._joined[shade] = steps, np.concatenate([self._tables[step, shade] for step in steps])
+                if step not in self._tables:
+                    self._tables[step] = self._table_in(math.exp(LIGHT_STEP * step))
+            joined = np.concatenate([self._tables[step] for step in steps])
+            if shade:
+                labels = self._shade
+                if labels is None:
+                    labels = self._shade = _shade_table(self.board, UNKNOWN if paint is None else paint)
+                joined = np.where(joined == OTHER, np.tile(labels, len(steps)), joined)
+            self._joined[shade] = steps, joined
         return self._joined[shade][1]
 
-    def _table_in(self, light: float, shade: bool) -> np.ndarray:
+    def _table_in(self, light: float) -> np.ndarray:
         """The table of one level; gates shrink and grow with the light, as all differences of colours do."""
         board, paint = (
             UNKNOWN if color is None else np.minimum(np.float32(light) * color, np.float32(_WHITE))
             for color in self._tabled
         )
-        return _label_table(board, paint, self._gate * light, shade)
+        return _label_table(board, paint, self._gate * light)
 
     def like_around(self, grid: CoarseGrid, colors: np.ndarray, seed: tuple[int, int], radius: int) -> np.ndarray:
         """Labels of samples by the colour around a seed: BOARD for similar ones, uint8 (rows, columns)."""

@@ -53,34 +53,27 @@ _BEYOND = 0.06
 #: [grey levels].
 SHADED, DARKEST = 0.92, 0.12
 _TINT, _TINT_NOISE = 0.055, 3.0
-#: The sun that a surface mirrors adds white light to its own: at most this [grey levels], to this part of its colour at
-#: least and at most. A grey surface only gets brighter: white light shows at colours with this sine from grey.
-_MOST_GLARE, _GLARED_LEAST, _GLARED_MOST, _COLORED = 400.0, 0.4, 1.4, 0.15
+#: The sun that a surface mirrors adds white light, up to this [grey levels], to its own colour times a factor within
+#: these. A grey surface only gets brighter; a colour has this sine from grey. The gate shrinks with the distance from
+#: grey, to this fraction of it.
+_MOST_GLARE, _GLARED_LEAST, _GLARED_MOST, _COLORED, _HUE = 400.0, 0.65, 1.4, 0.15, 0.3
+
+
+@inner
+def _squared(color):
+    return color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
 
 
 @inner
 def in_other_light(one, two):
     """Whether two colours (3,) are one in sun and in shadow."""
-    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
-    twos = two[0] * two[0] + two[1] * two[1] + two[2] * two[2]
-    return _in_light(one, two, ones, twos) if ones < twos else _in_light(two, one, twos, ones)
-
-
-@inner
-def _in_light(dark, bright, darker, brighter):
-    """Whether a colour is the shadow of another, brighter one, by the squares of their lengths, too."""
+    ones, twos = _squared(one), _squared(two)
+    darker, brighter = min(ones, twos), max(ones, twos)
     if darker < DARKEST * DARKEST * brighter or darker > SHADED * SHADED * brighter or darker <= 0.0:
         return False
-    dot = dark[0] * bright[0] + dark[1] * bright[1] + dark[2] * bright[2]
-    for c in range(3):
-        one, two = (c + 1) % 3, (c + 2) % 3
-        if bright[c] >= _CUT and bright[one] < _CUT and bright[two] < _CUT:  # it is at least as bright as it looks
-            whole = dark[c] * (bright[one] + bright[two]) / max(dark[one] + dark[two], 1.0)
-            if whole > bright[c]:
-                dot += dark[c] * (whole - bright[c])
-                brighter += whole * whole - bright[c] * bright[c]
+    dot = one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
     gate = _TINT + _TINT_NOISE / math.sqrt(darker)
-    return 1.0 - dot * dot / (darker * brighter) < gate * gate
+    return 1.0 - dot * dot / (ones * twos) < gate * gate
 
 
 @inner
@@ -90,24 +83,34 @@ def is_shaded(one, color):
 
 
 @inner
-def _is_glared(one, color):
-    """Whether a colour is a part of another one with white light: one = part color + white, cut off at the top."""
-    ones = one[0] * one[0] + one[1] * one[1] + one[2] * one[2]
-    twos = color[0] * color[0] + color[1] * color[1] + color[2] * color[2]
+def has_hue(color):
+    """Whether a colour (3,) is far enough from grey for white light to change its tint."""
+    return _chroma_squared(color) > _COLORED * _COLORED * _squared(color)
+
+
+@inner
+def _chroma_squared(color):
+    """Squared distance of a colour from grey."""
     grey = color[0] + color[1] + color[2]
-    if twos - grey * grey / 3.0 < _COLORED * _COLORED * twos:
+    return _squared(color) - grey * grey / 3.0
+
+
+@inner
+def _is_glared(one, color):
+    """Whether a colour is another one with white light, one = part color + white, whose channels may be cut off."""
+    if not has_hue(color) or _squared(one) < _squared(color):
         return False
     # least squares over the channels that are not cut off
-    count, total, mixed, square, product = 0.0, 0.0, 0.0, 0.0, 0.0
+    count, total, mixed, square, product = 0, 0.0, 0.0, 0.0, 0.0
     for c in range(3):
         if one[c] < _CUT:
-            count += 1.0
+            count += 1
             total += color[c]
             mixed += one[c]
             square += color[c] * color[c]
             product += color[c] * one[c]
     spread = square * count - total * total
-    if count < 1.5 or spread < 1.0:
+    if count < 2 or spread <= 0.0:
         return False
     part = (product * count - mixed * total) / spread
     white = (mixed - part * total) / count
@@ -118,13 +121,13 @@ def _is_glared(one, color):
         left = one[c] - part * color[c] - white
         if one[c] < _CUT or left > 0.0:
             off += left * left
-    gate = _TINT * math.sqrt(ones) + _TINT_NOISE
+    gate = min(_TINT * math.sqrt(_squared(one)) + _TINT_NOISE, _HUE * part * math.sqrt(_chroma_squared(color)))
     return off < gate * gate
 
 
 @kernel("b1[::1](f8[:, ::1], f8[::1])")
 def _shaded(colors, color):
-    """Whether colours (n, 3) are a colour (3,) in sun or shadow, (n,)."""
+    """Whether colours (n, 3) are a colour (3,) in sun, in shadow, or in glare, (n,)."""
     found = np.empty(len(colors), np.bool_)
     for k in range(len(colors)):
         found[k] = is_shaded(colors[k], color)
@@ -132,7 +135,7 @@ def _shaded(colors, color):
 
 
 def shaded_colors(colors: np.ndarray, color: np.ndarray) -> np.ndarray:
-    """Whether colours (..., 3) are a colour (3,) where a shadow begins or ends, bool (...)."""
+    """Whether colours (..., 3) are a colour (3,) in sun, in shadow, or in glare, bool (...)."""
     found = _shaded(np.ascontiguousarray(colors, float).reshape(-1, 3), np.ascontiguousarray(color, float))
     return found.reshape(colors.shape[:-1])
 

@@ -53,7 +53,7 @@ _MOST = 2
 #: differ by less than this fraction; a board 1 cm before a wall, seen from 1 m, has 1 %. Readings farther off are of
 #: another thing; of the near ones this fraction at most may be. The limit grows with the noise of few readings, by this
 #: factor at most.
-_FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW, _NOISIER = 3, 0.007, 0.05, 0.3, 2.0
+_FAR_FROM, _NO_STEP, _NEAR_PLANE, _FEW, _NOISIER = 3, 0.007, 0.05, 0.3, 1.3
 #: By so large a fraction of the line the surface ends a little farther out, and the shadow's edge lies before that.
 _ENDS_SOON = 0.3
 #: A border that only colour shows counts this much, and one that depth shows against the colour.
@@ -296,8 +296,8 @@ def _read_depth(depth, mask, u, v, nx, ny, distances, plane, gate, states, off):
 def _level(off, whole):
     """Whether the surface goes on beyond a line by depth.
 
-    Of the readings on both sides these are the sum, the number, and the number of those far off, (2, 3); a whole side
-    has so many. Means of fewer ones, at the border of the picture, are noisier.
+    Of the readings on both sides these are the sum, the number, and the number of those far off, (2, 3); `whole` is the
+    number on a side without gaps. Means of fewer ones, as at the border of the picture, are noisier.
     """
     one, two = off[0, 1], off[1, 1]
     if one <= off[0, 2] * (1.0 / _FEW - 1.0) or two <= off[1, 2] * (1.0 / _FEW - 1.0):

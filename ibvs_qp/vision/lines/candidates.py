@@ -145,13 +145,13 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
         same = next((k for k, other in enumerate(kept) if on_same_edge(line, other.line.ends_px, scale)), None)
         if same is None:
             kept.append(line)
-        elif line.kind == kept[same].kind and goes_on(line, kept[same].score, kept[same].line.length_px):
+        elif line.kind == kept[same].kind and _goes_on(line, kept[same]):
             kept[same] = line
     return sorted(kept, key=lambda entry: -entry.score)
 
 
 def demote_nested(lines: list[Candidate], picture: Picture) -> list[Candidate]:
-    """The lines in their order; a border beside one farther out, where the surface certainly ends, is no sure one.
+    """The lines in their order; a border beside one farther out, where the surface certainly ends, loses confidence.
 
     Runs of paint, dirt and shadows within 26 px of the true end change the colour, and depth ends there as well.
     """
@@ -179,10 +179,14 @@ def _inwards(line: Candidate, other: Candidate) -> float:
     return other.surface_side * (x * math.cos(other.line.theta) + y * math.sin(other.line.theta) - other.line.rho)
 
 
-def goes_on(longer: Candidate, score: float, length_px: float) -> bool:
-    """Whether a line on an edge is longer than another, and such an edge in its further part: scores are means."""
-    more = longer.line.length_px - length_px
-    return more > 0.0 and longer.score * longer.line.length_px - score * length_px >= _FURTHER_SHARE * score * more
+def _goes_on(longer: Candidate, line: Candidate) -> bool:
+    return goes_on(longer.score, longer.line.length_px, line.score, line.line.length_px)
+
+
+def goes_on(score: float, length_px: float, shorter_score: float, shorter_px: float) -> bool:
+    """Whether a line is longer than another on its edge, and such an edge in its further part: scores are means."""
+    more = length_px - shorter_px
+    return more > 0.0 and score * length_px - shorter_score * shorter_px >= _FURTHER_SHARE * shorter_score * more
 
 
 def role_of(theta: float, tilt: float) -> str:

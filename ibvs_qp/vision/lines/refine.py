@@ -113,7 +113,7 @@ class LineFits:
             picture.rgb,
             picture.mask,
             _NO_DEPTH if picture.plane is None else picture.depth.reshape(-1),
-            _NO_LABELS if colors.board is None else colors.table(shade=True),
+            _NO_LABELS if colors.board is None else colors.table(shade=picture.plane is not None),
             colors.levels,
             picture.intrinsics,
             picture.plane or (0.0, 0.0, 0.0),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, label_of, level_at
+from ibvs_qp.vision.appearance.colors import BOARD, OTHER, PAINT, SHADE, label_of, level_at
 from ibvs_qp.vision.compilation import inner, upper_median
 
 #: Demands of a line on its two sides: none, paint beside board, border of the surface.
@@ -206,10 +206,12 @@ def find_admissible(pixels, view, demand, strip, side, allowed):
             elif demand == ANY:
                 allowed[k, i] = 1
             elif demand == PAINT_EDGE:
-                allowed[k, i] = (label[i + own] == BOARD) & (label[i + far] == PAINT)
+                allowed[k, i] = (label[i + own] & ~SHADE == BOARD) & (label[i + far] & ~SHADE == PAINT)
             else:  # a wall may have the colour of board or paint, but not their depth; lines on the board have both
-                on = (label[i + own] != OTHER) & (away[i + own] <= _OFF_OWN)
-                allowed[k, i] = on & ((label[i + far] == OTHER) | (away[i + far] > _OFF_FAR))
+                most = _OFF_FAR if label[i + own] & SHADE else _OFF_OWN  # a grey wall is a white board in shade
+                on = (label[i + own] != OTHER) & (away[i + own] <= most)
+                beyond = (label[i + far] == OTHER) | (label[i + far] & SHADE != 0)
+                allowed[k, i] = on & (beyond | (away[i + far] > _OFF_FAR))
 
 
 @inner

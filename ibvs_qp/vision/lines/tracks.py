@@ -148,6 +148,17 @@ def _leaves(track: TrackState, picture: Picture) -> bool:
     return max(ends) < least or min(ends) > size - 1 - least
 
 
+def _continues(longer: TrackState, track: TrackState) -> bool:
+    """Whether a track is a longer line on the edge of another; one that leans off the edge fits its sides worse.
+
+    The score of an edge of paint is its length, and that of a hint 1: neither is a mean along the line.
+    """
+    if longer.kind != track.kind or longer.line.length_px <= _LONGER * track.line.length_px:
+        return False
+    rated = track.kind == "board" and not track.hint
+    return not rated or goes_on(longer.score, longer.line.length_px, track.score, track.line.length_px)
+
+
 class LineTracker:
     """All tracks of one camera."""
 
@@ -212,6 +223,8 @@ class LineTracker:
         """
         seen = [track for track in self.tracks if track.seen and track.kind == "board"]
         scored = self._search.classify_lines([track.line for track in seen], picture, surface)
+        for track, line in zip(seen, scored, strict=True):
+            track.borders_plane = track.borders_plane or line.borders_plane
         known = tuple(track.line for track in self.tracks if calm and track.settled)
         found = demote_nested(scored + self._search.find_candidates(picture, surface, known), picture)
         for track, line in zip(seen, found, strict=False):
@@ -230,10 +243,8 @@ class LineTracker:
         same = next((track for track in self.tracks if self._same(track, fresh, picture)), None)
         if same is None:
             self._start(candidate)
-        elif same.kind == candidate.kind and candidate.line.length_px > _LONGER * same.line.length_px:
-            # a longer fit that leans off the edge fits its sides worse; the score of an edge of paint is its length
-            if same.kind == "paint" or goes_on(candidate, same.score, same.line.length_px):
-                same.adopt(candidate.line)
+        elif _continues(fresh, same):
+            same.adopt(candidate.line)
 
     def _start(self, candidate: Candidate, hint: str = "") -> None:
         if len(self.tracks) < self._config.track.capacity:
@@ -300,7 +311,7 @@ class LineTracker:
             if twin is None:
                 kept.append(track)
                 continue
-            if track.kind == twin.kind and track.line.length_px > _LONGER * twin.line.length_px:
+            if _continues(track, twin):
                 twin.adopt(track.line)
             if track.hint and not twin.hint:
                 twin.hint = track.hint

@@ -74,7 +74,7 @@ class SurfaceTracker:
 
     def lose(self) -> None:
         """The next picture searches the surface."""
-        self.plane = None
+        self.plane, self._colors.shadowed = None, False
 
     def find_surface(
         self, picture: Picture, predicted: np.ndarray | None, seed_pixel: tuple[float, float] | None

@@ -97,3 +97,30 @@ def test_predictions_that_are_no_numbers_find_nothing_and_leave_the_others_alone
     queries.append(FITS.query((EDGE - center) / focal, 0.5 * math.pi))
     found = FITS.fit_lines(picture(upright=False), queries, 14.0, contents=True)
     assert [line is not None for line in found] == [False] * (len(queries) - 1) + [True]
+
+
+@pytest.mark.parametrize("behind", [0.02, 0.04, 0.07])
+def test_a_joint_of_a_grey_wall_is_no_border_of_a_white_board_in_shadow(behind: float) -> None:
+    board, wall, joint = (228, 226, 220), (150, 149, 146), (70, 70, 68)
+    rgb = np.empty((*SIZE, 3), np.uint8)
+    rgb[:], rgb[:, :320], rgb[:, 328:334] = wall, board, joint
+    rgb = cv2.GaussianBlur(rgb, (0, 0), 0.8)
+    depth = np.full(SIZE, 1.0 + behind, np.float32)
+    depth[:, :320] = 1.0
+    colors = SurfaceColors(board, None, LineConfig().color_gate)
+    colors.shadowed = True
+    fits, frame = LineFits(LineConfig(), colors), RgbdFrame(rgb=rgb, depth=depth, intrinsics=INTRINSICS, stamp_ns=0)
+    picture = Picture(frame, PictureLayout(frame, VisionConfig(), None))
+    picture.plane = (0.0, 0.0, 1.0)
+    focal, middle = INTRINSICS[0], INTRINSICS[2]
+    query = fits.query(
+        (325.0 - middle) / focal,
+        0.0,
+        step=np.subtract(wall, board).astype(float),
+        span=(-1.0, 1.0),
+        extent=(-0.3, 0.3),
+        kind="board",
+        surface_side=-1,
+    )
+    [line] = fits.fit_lines(picture, [query], 12.0)
+    assert line is not None and abs(line.rho * focal + middle - 319.5) < 0.5

@@ -61,7 +61,10 @@ def test_a_flight_has_some_of_the_effects_by_its_seed() -> None:
         assert 0.2 < np.mean(present) < 0.4, name
     assert all(bool(each.wet_gloss) == bool(each.wet_holes) for each in drawn)
     assert field.drawn(stream(3, "outdoor effects")) == drawn[3]
-    assert dataclasses.replace(field, chance=0.0).drawn(stream(3, "outdoor effects")).drops == 0
+    assert dataclasses.replace(field, chance=0.0).drawn(stream(3, "outdoor effects")) == OutdoorErrors()
+    assert dataclasses.replace(field, chance=1.0).drawn(stream(3, "outdoor effects")) == dataclasses.replace(
+        field, chance=1.0
+    )
 
 
 def test_wall_and_lens_keep_their_effects_and_the_own_shadow_moves() -> None:
@@ -114,9 +117,17 @@ def test_another_colour_is_no_glare() -> None:
     assert not shaded_colors(np.array([[255, 255, 255], [255, 255, 20]]), lime).any()  # cut off: nothing is known
 
 
-def test_paint_and_brick_are_no_shadow() -> None:
-    board = np.array([228.0, 226.0, 220.0])
-    assert not shaded_colors(np.array([[40, 90, 200], [150, 112, 92], [190, 50, 50], [12, 12, 12]]), board).any()
+@pytest.mark.parametrize("gain", [1.0, 1.1, 1.2, 1.3])  # channels are cut off one after the other
+def test_paint_and_brick_are_no_shadow(gain: float) -> None:
+    board = np.minimum(gain * np.array([228.0, 226.0, 220.0]), 255.0)
+    others = gain * np.array([[40, 90, 200], [150, 112, 92], [180, 120, 100], [190, 50, 50], [12, 12, 12]])
+    assert not shaded_colors(np.minimum(others, 255.0), board).any()
+
+
+# sand, and walls that are duller, greener or paler by more than glare
+def test_other_tints_are_no_glare() -> None:
+    sand = np.array([200.0, 175.0, 130.0])
+    assert not shaded_colors(np.array([[200, 215, 175], [190, 182, 168], [215, 220, 185]]), sand).any()
 
 
 def guide_errors(scene: TruthScene) -> list[float]:
@@ -137,6 +148,12 @@ def test_a_grey_wall_close_behind_a_white_board_is_no_shadow() -> None:
     scene = dataclasses.replace(scene, board_color=(228, 228, 228), wall_color=(130, 130, 130), wall="plain")
     for gap_m in (0.05, 0.02):
         assert max(guide_errors(dataclasses.replace(scene, gap_m=gap_m))) < 2.0, gap_m
+
+
+def test_brick_close_behind_an_overexposed_board_is_no_shadow() -> None:
+    scene = dataclasses.replace(sample_scene(FAMILIES["near wall"], 2), gap_m=0.005, shading=0.0)
+    seen = dataclasses.replace(scene, board_color=(255, 244, 224), wall_color=(196, 146, 120))  # red is cut off
+    assert max(guide_errors(seen)) < 2.0
 
 
 # 46: the board's middle is in shadow; 7: two shadows across, the nearer one along the side
