@@ -99,7 +99,7 @@ class SurfaceTracker:
         if isinstance(found, str):
             return found
         self.plane, self.region = found.plane, found
-        self._colors.shadowed = found.shadowed
+        self._colors.shadowed = found.shadowed and not found.by_color  # a wall at its depth may be the board in shade
         return None
 
     def region_now(self, picture: Picture) -> SurfaceRegion:
@@ -113,7 +113,7 @@ class SurfaceTracker:
             plane = self._refit(plane, picture) or plane
         if self.region.plane is not plane:
             self.region = self._follow(picture, plane, self.region)
-            self._colors.shadowed = self.region.shadowed
+            self._colors.shadowed = self.region.shadowed and not self.region.by_color
         return self.region
 
     def _followed(self, picture: Picture, predicted: np.ndarray) -> PlaneEstimate | None:
