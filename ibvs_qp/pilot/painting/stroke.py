@@ -27,9 +27,8 @@ MOST_UNLED_M = 0.4
 UNLED_BEFORE_M, ASIDE_SLOPE, MOST_ASIDE = 0.05, 0.06, 0.75
 #: Way outwards of a step from stroke to stroke and of an alignment while no edge is in view [m].
 ASIDE_M = 0.002
-#: Most of the time of painting without contact [-]; push of no contact [N]; a place has felt the brush above
-#: this part of the commanded push [-]: the filtered push falls late, and a hole looks shorter by 10 mm at 0.3, by 5 mm
-#: at 0.5.
+#: Most of the time of painting without contact [-]; push of no contact [N]; part of the commanded push above which a
+#: place has felt the brush [-]: the filtered push falls late, and a hole looks shorter by 10 mm at 0.3, by 5 mm at 0.5.
 MOST_LOST, LOST_N, FELT_SHARE = 0.02, 0.3, 0.5
 #: Length of the pieces of a stroke that have felt the brush or not [m]: more than one tick's way at 0.5 m/s.
 PIECE_M = 0.0025

@@ -145,7 +145,7 @@ def _each_edge_once(lines: list[Candidate], scale: float) -> list[Candidate]:
         same = next((k for k, other in enumerate(kept) if on_same_edge(line, other.line.ends_px, scale)), None)
         if same is None:
             kept.append(line)
-        elif line.kind == kept[same].kind and _goes_on(line, kept[same]):
+        elif line.kind == kept[same].kind and goes_on(line.score, line.line, kept[same].score, kept[same].line):
             kept[same] = line
     return sorted(kept, key=lambda entry: -entry.score)
 
@@ -179,14 +179,10 @@ def _inwards(line: Candidate, other: Candidate) -> float:
     return other.surface_side * (x * math.cos(other.line.theta) + y * math.sin(other.line.theta) - other.line.rho)
 
 
-def _goes_on(longer: Candidate, line: Candidate) -> bool:
-    return goes_on(longer.score, longer.line.length_px, line.score, line.line.length_px)
-
-
-def goes_on(score: float, length_px: float, shorter_score: float, shorter_px: float) -> bool:
+def goes_on(score: float, line: RefinedLine, shorter_score: float, shorter: RefinedLine) -> bool:
     """Whether a line is longer than another on its edge, and such an edge in its further part: scores are means."""
-    more = length_px - shorter_px
-    return more > 0.0 and score * length_px - shorter_score * shorter_px >= _FURTHER_SHARE * shorter_score * more
+    more, whole = line.length_px - shorter.length_px, score * line.length_px
+    return more > 0.0 and whole - shorter_score * shorter.length_px >= _FURTHER_SHARE * shorter_score * more
 
 
 def role_of(theta: float, tilt: float) -> str:

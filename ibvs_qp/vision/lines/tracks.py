@@ -123,7 +123,6 @@ class TrackState:
         """Blend in the appearance of its two sides in a picture."""
         self.score += _SCORE_BLEND * (found.score - self.score)
         self.certainty += _SCORE_BLEND * (found.confidence - self.certainty)
-        self.borders_plane = self.borders_plane or found.borders_plane
 
     def adopt(self, line: RefinedLine) -> None:
         """Take a fresh fit; its normal may point the other way."""
@@ -156,7 +155,7 @@ def _continues(longer: TrackState, track: TrackState) -> bool:
     if longer.kind != track.kind or longer.line.length_px <= _LONGER * track.line.length_px:
         return False
     rated = track.kind == "board" and not track.hint
-    return not rated or goes_on(longer.score, longer.line.length_px, track.score, track.line.length_px)
+    return not rated or goes_on(longer.score, longer.line, track.score, track.line)
 
 
 class LineTracker:
@@ -227,9 +226,10 @@ class LineTracker:
             track.borders_plane = track.borders_plane or line.borders_plane
         known = tuple(track.line for track in self.tracks if calm and track.settled)
         found = demote_nested(scored + self._search.find_candidates(picture, surface, known), picture)
-        for track, line in zip(seen, found, strict=False):
+        followed, fresh = found[: len(seen)], found[len(seen) :]
+        for track, line in zip(seen, followed, strict=True):
             track.blend(line)
-        candidates = sorted(found[len(seen) :], key=lambda entry: -entry.score)
+        candidates = sorted(fresh, key=lambda entry: -entry.score)
         for candidate in candidates:
             if candidate.kind and candidate.score >= self._config.detect.min_score:
                 self._offer(candidate, picture)

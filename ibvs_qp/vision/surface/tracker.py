@@ -98,8 +98,8 @@ class SurfaceTracker:
         found = self._find(picture, seeds, bare=seed_pixel is None)
         if isinstance(found, str):
             return found
-        self.plane, self.region = found.plane, found
-        self._colors.shadowed = found.shadowed and not found.by_color  # a wall at its depth may be the board in shade
+        self.plane = found.plane
+        self._take(found)
         return None
 
     def region_now(self, picture: Picture) -> SurfaceRegion:
@@ -112,9 +112,12 @@ class SurfaceTracker:
         if self._colors.learn_light(picture, *near):  # then all of the surface, not its well-lit part alone
             plane = self._refit(plane, picture) or plane
         if self.region.plane is not plane:
-            self.region = self._follow(picture, plane, self.region)
-            self._colors.shadowed = self.region.shadowed and not self.region.by_color
+            self._take(self._follow(picture, plane, self.region))
         return self.region
+
+    def _take(self, region: SurfaceRegion) -> None:
+        """Keep a region; where depth does not separate it from a wall, that may look like the board in shade."""
+        self.region, self._colors.shadowed = region, region.shadowed and not region.by_color
 
     def _followed(self, picture: Picture, predicted: np.ndarray) -> PlaneEstimate | None:
         """The surface refitted around its prediction on few samples; None if too little of it is left."""
